@@ -18,6 +18,7 @@ use crate::scene::Scene;
 use crate::session::{Detail, Nursery, Session, SwayReport};
 use crate::sim::{self, Settings, Simulation, Stats};
 use crate::tree::ModuleString;
+use crate::turtle;
 
 /// Why a command ends without success, which determines the exit status.
 #[derive(Debug)]
@@ -138,6 +139,8 @@ pub struct ModelRun {
 struct Remarks {
     known: HashSet<(String, Option<Span>)>,
     waiting: Vec<Diagnostic>,
+    /// What is written holds no gases.
+    lacks_gases: bool,
 }
 
 /// The content of the file of `--stats`.
@@ -298,7 +301,21 @@ impl ModelRun {
 
     /// Draws the strings of a run, with plants of other models.
     pub fn nursery(&self) -> Nursery<'_> {
-        Nursery::new(&self.session.model, self.settings).for_picture(self.detail)
+        let nursery = Nursery::new(&self.session.model, self.settings).for_picture(self.detail);
+        let lacks_gases = self.remarks.lock().unwrap_or_else(PoisonError::into_inner).lacks_gases;
+        if lacks_gases { nursery.without_gases() } else { nursery }
+    }
+
+    /// Notes that files or pages of some sort do not hold the gases of the model, if it has any; these are not followed then.
+    pub fn note_missing_gases(&self, what: &str) {
+        let model = &self.session.model;
+        if let Some(span) = turtle::place_of_source(model).filter(|_| turtle::lets_out(model)) {
+            let warning = Diagnostic::warning(format!("{what} does not hold gases"))
+                .at(span, "what begins here is not seen in it")
+                .help("PNG pictures and films show gases: `dlsys render MODEL --format png`; OBJ and USDA files have blobs as points");
+            self.note(vec![warning]);
+            self.remarks.lock().unwrap_or_else(PoisonError::into_inner).lacks_gases = true;
+        }
     }
 
     /// Notes how the plants of a pass were followed in the wind. A pass of scenes that are kept follows none.

@@ -20,6 +20,7 @@ mod falling;
 mod files;
 mod films;
 mod gallery;
+mod gas;
 mod glb;
 mod glb_reader;
 mod groups;

@@ -5,7 +5,7 @@
 
 use crate::scope::{RESERVED, Variables};
 use dlsys_diagnostic::Diagnostic;
-use dlsys_model::{Class, ELASTIC, Kinds};
+use dlsys_model::{Class, ELASTIC, Kinds, SOURCE};
 use dlsys_syntax::ast::{Expr, ExprId, Expressions, HeadModule, Module, Name};
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::{did_you_mean, meant, nearest};
@@ -165,13 +165,14 @@ pub fn decimal_comma(
     (joined && texts.len() == wanted).then(|| texts.join(", "))
 }
 
-/// Help for an unknown name in `;(rose)`, `@C(square)` or `@E(stalk)`: the missing declaration is a colour, a contour or a
-/// tissue.
+/// Help for an unknown name in `;(rose)`, `@C(square)`, `@E(stalk)` or `@S(steam)`: the missing declaration is a colour, a contour,
+/// a tissue or a gas.
 pub fn of_look(module: &Module, all: &Expressions, said: &mut [Diagnostic]) {
     let example = match &*module.name {
         ";" => "color NAME = \"#e573a5\"",
         "@C" => "contour NAME = (1, 1) (-1, 1) (-1, -1) (1, -1)",
         ELASTIC => "tissue NAME = stiffness 2e8, density 900, damping 0.05",
+        SOURCE => "gas NAME = size 0.01, mass 1e-6, extinction 200",
         _ => return,
     };
     let Some(Expr::Name(name)) = module.arguments.first().map(|a| all.get(a.root)) else { return };

@@ -12,7 +12,7 @@ use crate::chance::Clocks;
 use crate::clauses::names_of;
 use crate::declared::DeclaredRule;
 use crate::rules::RuleBuilder;
-use crate::scene_checks::TissueNumber;
+use crate::scene_checks::MaterialNumber;
 use crate::scenery::Nesting;
 use crate::scope::{Scope, Variables};
 use crate::strain::{self, Strains};
@@ -48,7 +48,7 @@ pub fn build(
     }
     parts.check_strings(&mut builder, unread);
     porting::comments(document, &mut builder.scope.diagnostics);
-    let RuleBuilder { occurs, drawn, clocks, strains, tissues, .. } = builder;
+    let RuleBuilder { occurs, drawn, clocks, strains, materials, .. } = builder;
     if !parts.singles.seen(INITIAL_STRING) && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -64,7 +64,7 @@ pub fn build(
     if parts.faulty || unread {
         return None;
     }
-    let places = Places { occurs, drawn, tissues };
+    let places = Places { occurs, drawn, materials };
     let looks = Looks { parameters, appearance, scenery };
     Some(parts.model(document, kinds, (&clocks, &strains), &places, looks, scope))
 }
@@ -76,11 +76,11 @@ struct Looks {
     scenery: Scenery,
 }
 
-/// The first place of each kind of module in strings and in drawings, and the tissues that strings name.
+/// The first place of each kind of module in strings and in drawings, and the tissues and gases that strings name.
 struct Places {
     occurs: HashMap<KindId, Span>,
     drawn: HashMap<KindId, Span>,
-    tissues: Vec<TissueNumber>,
+    materials: Vec<MaterialNumber>,
 }
 
 /// The declarations and rules that have been lowered.
@@ -247,7 +247,9 @@ impl<'d> Parts<'d> {
         let all = drawn.iter().chain(occurs).map(|(k, s)| (*k, *s)).collect();
         scene_checks::ground(&model, &all, diagnostics);
         scene_checks::detach(&model, &all, diagnostics);
-        scene_checks::tissues(&model, &all, &places.tissues, diagnostics);
+        scene_checks::tissues(&model, &all, &places.materials, diagnostics);
+        scene_checks::gases(&model, &all, &places.materials, diagnostics);
+        scene_checks::gases_of_plants(&model, diagnostics);
         scene_checks::solids(&model, occurs, drawn, diagnostics);
         check::commands(&model, diagnostics, &all);
         check::surface_sizes(&model, diagnostics, &all);
@@ -388,6 +390,9 @@ fn unused(document: &Document, scope: &mut Scope) {
             }
             Item::Tissue { name, .. } => {
                 ("tissue", name, format!("let stems give way: `@E({})` in a string before them", text(name)))
+            }
+            Item::Gas { name, .. } => {
+                ("gas", name, format!("let it out: `@S({}, rate, radius)` in a string", text(name)))
             }
             _ => continue,
         };

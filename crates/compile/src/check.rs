@@ -9,7 +9,7 @@ use crate::scene_checks::is_hidden;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, ConditionStep, ContextPart, DETACH, DRAWN_WORDS,
-    ELASTIC, GROUND, KindId, Model, Pattern, Remedy, Rule, SURFACE_SIZES, Sign, base_of, class_of,
+    ELASTIC, GROUND, KindId, Model, Pattern, Remedy, Rule, SOURCE, SURFACE_SIZES, Sign, base_of, class_of,
 };
 use dlsys_syntax::ast;
 use dlsys_syntax::foreign_syntax;
@@ -296,6 +296,7 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
                     || name == GROUND
                     || kind.base() == DETACH
                     || kind.base() == ELASTIC
+                    || kind.base() == SOURCE
                     || model.scenery.plants.iter().any(|plant| plant.name == name)
                     || model.appearance.surfaces.iter().any(|shape| shape.name == name) => {}
             Class::Surface => diagnostics.push(
@@ -347,7 +348,7 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
 /// Reports turtle commands with too few parameters.
 pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashMap<KindId, Span>) {
     for (id, kind) in model.kinds.iter() {
-        let mut commands = COMMAND_SURFACES.into_iter().chain([(ELASTIC, 1)]);
+        let mut commands = COMMAND_SURFACES.into_iter().chain([(ELASTIC, 1), (SOURCE, 2)]);
         let Some((name, needed)) = commands.find(|(name, _)| *name == kind.base()) else {
             continue;
         };
@@ -359,6 +360,9 @@ pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashM
             "@T" => "`@T(e)`, e the strength of the tropism",
             "@C" => "`@C(name)`, name that of a `contour`",
             ELASTIC => "`@E(name)`, name that of a `tissue`, or `@E(0)`: rigid from here",
+            SOURCE => {
+                "`@S(gas, rate, radius)`: blobs in a unit of t, and the distance within which they begin"
+            }
             "@PC" => "`@PC(n, row, column)`: a control point of patch n, row and column from 0 to 3",
             "@PS" => "`@PS(n)`: patch n begins",
             _ => "`@PD(n)`: patch n is drawn",

@@ -1,4 +1,4 @@
-//! Constants, `param`s, functions, and the numbers of colours and tissues, in the order of their dependencies.
+//! Constants, `param`s, functions, and the numbers of colours, tissues and gases, in the order of their dependencies.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -24,7 +24,7 @@ enum GlobalKind<'d> {
     Const(Expression),
     Param(Expression, Option<(Expression, Expression)>),
     Def(&'d [Name], Expression),
-    /// The number of a colour, a gradient, a contour or a tissue.
+    /// The number of a colour, a gradient, a contour, a tissue or a gas.
     Number(usize),
     Array(&'d [Expression]),
     Curve(&'d Item, Span),
@@ -98,6 +98,7 @@ fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
     let mut next_gradient = first_gradient(document);
     let mut next_contour = 1;
     let mut next_tissue = 1;
+    let mut next_gas = 1;
     let count = |next: &mut usize| {
         *next += 1;
         GlobalKind::Number(*next - 1)
@@ -116,6 +117,7 @@ fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
             Item::Gradient { name, .. } => (name, count(&mut next_gradient)),
             Item::Contour { name, .. } => (name, count(&mut next_contour)),
             Item::Tissue { name, .. } => (name, count(&mut next_tissue)),
+            Item::Gas { name, .. } => (name, count(&mut next_gas)),
             _ => continue,
         };
         let Name { text, span } = name;

@@ -25,6 +25,7 @@ mod dead_rules;
 mod declared;
 mod equations;
 mod functions;
+mod gases;
 mod gather;
 mod globals;
 mod locals;

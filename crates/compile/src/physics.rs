@@ -6,8 +6,8 @@ use dlsys_expr::Program;
 use dlsys_model::{Flow, Primitive, Spectrum, Tissue, Units, Wind};
 use dlsys_syntax::ast::{Attribute, Expression, Name};
 
-/// Maximum number of tissues, and of flows, of one model.
-const MAX_DECLARED: usize = 1000;
+/// Maximum number of tissues, of gases, and of flows, of one model.
+pub(crate) const MAX_DECLARED: usize = 1000;
 /// Greatest seed: all whole numbers up to this one are numbers of the language.
 const MAX_SEED: f64 = 9_007_199_254_740_992.0;
 /// Number of times at which a speed is compared with itself one period later.
@@ -16,26 +16,26 @@ const SAMPLES: u32 = 64;
 const SAME_SPEED: f64 = 1e-6;
 
 /// A value of an attribute: its bounds, and how messages name it.
-struct Quantity {
+pub(crate) struct Quantity {
     /// As a part of a sentence: `this is no …`.
-    name: &'static str,
+    pub(crate) name: &'static str,
     /// The unit with a space before it; empty if it has none.
-    unit: &'static str,
+    pub(crate) unit: &'static str,
     /// True if 0 is one of its values.
-    zero: bool,
+    pub(crate) zero: bool,
     /// The greatest value.
-    most: f64,
+    pub(crate) most: f64,
     /// The remedy if the value is none.
-    help: &'static str,
+    pub(crate) help: &'static str,
 }
 
 /// A quantity that is greater than 0.
-const fn positive(name: &'static str, unit: &'static str, help: &'static str) -> Quantity {
+pub(crate) const fn positive(name: &'static str, unit: &'static str, help: &'static str) -> Quantity {
     Quantity { name, unit, zero: false, most: f64::MAX, help }
 }
 
 /// A quantity that is 0 or greater.
-const fn not_negative(name: &'static str, unit: &'static str, help: &'static str) -> Quantity {
+pub(crate) const fn not_negative(name: &'static str, unit: &'static str, help: &'static str) -> Quantity {
     Quantity { zero: true, ..positive(name, unit, help) }
 }
 
@@ -99,7 +99,7 @@ const DECAY: Quantity = positive(
 );
 
 /// A number in a message; very large and very small ones with an exponent.
-fn shown(value: f64) -> String {
+pub(crate) fn shown(value: f64) -> String {
     match value.abs() {
         0.0 | 1e-4..1e6 => value.to_string(),
         _ => format!("{value:e}"),
@@ -114,7 +114,7 @@ fn rounded(value: f64) -> String {
 
 impl Builder<'_> {
     /// The attributes with these words, in this order. One that is written twice is an error.
-    fn sorted<'a, const N: usize>(
+    pub(crate) fn sorted<'a, const N: usize>(
         &mut self,
         attributes: &'a [Attribute],
         words: [&str; N],
@@ -159,7 +159,7 @@ impl Builder<'_> {
     }
 
     /// The value of an attribute; None without it, or if it has an error.
-    fn attribute(&mut self, attribute: Option<&Attribute>, quantity: &Quantity) -> Option<f64> {
+    pub(crate) fn attribute(&mut self, attribute: Option<&Attribute>, quantity: &Quantity) -> Option<f64> {
         self.quantity(*attribute?.values.first()?, quantity)
     }
 

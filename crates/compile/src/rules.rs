@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::advice;
 use crate::chance::Clocks;
 use crate::declared::DeclaredPattern;
-use crate::scene_checks::TissueNumber;
+use crate::scene_checks::MaterialNumber;
 use crate::scope::{RESERVED, Scope, Variables};
 use crate::strain::Strains;
 use dlsys_diagnostic::{Diagnostic, Span};
@@ -31,7 +31,7 @@ pub struct RuleBuilder<'b> {
     /// Each kind that occurs in the drawing of another kind, with its first place.
     pub drawn: HashMap<KindId, Span>,
     /// The constant arguments of `@E`, in strings and drawings.
-    pub tissues: Vec<TissueNumber>,
+    pub materials: Vec<MaterialNumber>,
 }
 
 impl<'b> RuleBuilder<'b> {
@@ -42,7 +42,7 @@ impl<'b> RuleBuilder<'b> {
         kinds: &'b mut Kinds,
         (clocks, strains): (Clocks, Strains),
     ) -> RuleBuilder<'b> {
-        let (occurs, drawn, tissues) = Default::default();
+        let (occurs, drawn, materials) = Default::default();
         let (parent_strain, open_around) = (None, 0);
         RuleBuilder {
             document,
@@ -54,7 +54,7 @@ impl<'b> RuleBuilder<'b> {
             open_around,
             occurs,
             drawn,
-            tissues,
+            materials,
         }
     }
 

@@ -1,13 +1,13 @@
-//! Checks of the modules of a scene: `@G` needs a ground, `@E(NAME)` a tissue, `@D` has no parameters, and what is solid is drawn.
+//! Checks of the modules of a scene: `@G` needs a ground, `@E(NAME)` a tissue, `@S(NAME, …)` a gas, `@D` has no parameters, and what is solid is drawn.
 
 use std::collections::HashMap;
 
 use dlsys_diagnostic::{Diagnostic, Severity, Span};
-use dlsys_model::{DETACH, ELASTIC, GROUND, Kind, KindId, Model};
+use dlsys_model::{DETACH, ELASTIC, GROUND, Kind, KindId, Model, SOURCE};
 use dlsys_syntax::foreign_syntax;
 
-/// The argument of a module that names a tissue, if it is a constant.
-pub struct TissueNumber {
+/// The argument of a module that names a tissue or a gas, if it is a constant.
+pub struct MaterialNumber {
     /// The module.
     pub kind: KindId,
     /// The value of the argument.
@@ -85,7 +85,7 @@ pub fn solids(
 pub fn tissues(
     model: &Model,
     places: &HashMap<KindId, Span>,
-    numbers: &[TissueNumber],
+    numbers: &[MaterialNumber],
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let is_command = |kind: &Kind| kind.base() == ELASTIC && !is_hidden(model, kind);
@@ -122,5 +122,69 @@ pub fn tissues(
                 ),
             ),
         );
+    }
+}
+
+/// Reports `@S(…)` in a model without a gas, and arguments that are the number of none.
+pub fn gases(
+    model: &Model,
+    places: &HashMap<KindId, Span>,
+    numbers: &[MaterialNumber],
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let is_command = |kind: &Kind| kind.base() == SOURCE && !is_hidden(model, kind);
+    let gases = &model.scenery.gases;
+    if gases.is_empty() {
+        for (id, kind) in model.kinds.iter() {
+            if let Some(span) = places.get(&id).filter(|_| is_command(kind) && kind.arity > 0) {
+                diagnostics.push(
+                    Diagnostic::error("`@S` lets out a gas, and there is none")
+                        .at(*span, "the model declares no gas")
+                        .help("declare one: `gas steam = size 0.01, mass 1e-6, extinction 200, fall -0.3`; then `@S(steam, 100, 0.02)`")
+                        .help_opt(
+                            foreign_syntax::module(SOURCE)
+                                .map(|there| format!("in cpfg it is another command; here {there}")),
+                        ),
+                );
+            }
+        }
+        return;
+    }
+    if diagnostics.iter().any(|said| said.severity == Severity::Error) {
+        return;
+    }
+    for number in numbers.iter().filter(|number| is_command(model.kinds.get(number.kind))) {
+        let is_one = number.value.fract() == 0.0 && (1.0..=gases.len() as f64).contains(&number.value);
+        if is_one {
+            continue;
+        }
+        let known: Vec<String> = gases.iter().take(8).map(|gas| format!("`{}`", gas.name)).collect();
+        let more = if gases.len() > 8 { ", …" } else { "" };
+        diagnostics.push(
+            Diagnostic::error("this is no gas")
+                .at(number.span, format!("it is {}", number.value))
+                .help(format!("write the name of a gas: {}{more}", known.join(", "))),
+        );
+    }
+}
+
+/// Warns of plants of other models that let out a gas: it is followed for the model of the scene only.
+pub fn gases_of_plants(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
+    for plant in &model.scenery.plants {
+        let mut inner = vec![&plant.model];
+        while let Some(within) = inner.pop() {
+            inner.extend(within.scenery.plants.iter().map(|plant| &plant.model));
+            if let Some(gas) = within.scenery.gases.first() {
+                diagnostics.push(
+                    Diagnostic::warning(format!(
+                        "the gas `{}` of the plant `{}` is not drawn",
+                        gas.name, plant.name
+                    ))
+                    .at(plant.span, "a gas in the model of a plant is left out here")
+                    .help("declare the gas in this model, and write `@S` beside the plant"),
+                );
+                break;
+            }
+        }
     }
 }

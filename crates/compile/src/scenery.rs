@@ -84,6 +84,7 @@ pub(crate) fn build(
             }
             Item::Flow { kind, attributes } => builder.flow(kind, attributes, *span),
             Item::Tissue { name, attributes } => builder.tissue(name, attributes, *span),
+            Item::Gas { name, attributes, colors } => builder.gas(name, (attributes, colors), *span),
             _ => {}
         }
     }

@@ -6,12 +6,13 @@ use std::collections::{HashMap, HashSet};
 use crate::advice;
 use crate::chance::Drawn;
 use crate::rules::RuleBuilder;
-use crate::scene_checks::TissueNumber;
+use crate::scene_checks::MaterialNumber;
 use crate::scope::{RESERVED, Scope, Variables, plural};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{NodeId, Program};
 use dlsys_model::{
-    Choice, Class, ELASTIC, KindId, Outcome, Part, Repeat, Stretch, Successor, base_of, choose, class_of,
+    Choice, Class, ELASTIC, KindId, Outcome, Part, Repeat, SOURCE, Stretch, Successor, base_of, choose,
+    class_of,
 };
 use dlsys_syntax::ast::{self, Alternative, HeadModule, modules_of};
 use dlsys_syntax::print;
@@ -229,7 +230,7 @@ impl RuleBuilder<'_> {
             let first = self.scope.draws.all.len() as u32;
             let argument = roots.len();
             good &= self.arguments(module, variables, count > 0, &mut roots);
-            self.note_tissue(module, kind, roots.get(argument));
+            self.note_material(module, kind, roots.get(argument));
             let draws = first..self.scope.draws.all.len() as u32;
             if !draws.is_empty() {
                 drawn.modules.push((place, draws));
@@ -286,15 +287,15 @@ impl RuleBuilder<'_> {
         good
     }
 
-    /// Notes the first argument of `@E` if it is a constant.
-    fn note_tissue(&mut self, module: &ast::Module, kind: KindId, argument: Option<&NodeId>) {
-        if base_of(&module.name) != ELASTIC {
+    /// Notes the first argument of `@E` and of `@S` if it is a constant.
+    fn note_material(&mut self, module: &ast::Module, kind: KindId, argument: Option<&NodeId>) {
+        if ![ELASTIC, SOURCE].contains(&base_of(&module.name)) {
             return;
         }
         let value = argument.and_then(|node| self.scope.graph.as_constant(*node));
         if let (Some(value), Some(written)) = (value, module.arguments.first()) {
             let span = self.document.expressions.span(written.root);
-            self.tissues.push(TissueNumber { kind, value, span });
+            self.materials.push(MaterialNumber { kind, value, span });
         }
     }
 

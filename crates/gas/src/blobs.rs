@@ -2,7 +2,7 @@
 
 use crate::carry::Moving;
 use crate::chance::Chance;
-use crate::{Error, Gas, Vector};
+use crate::{Error, Gas, Settings, Vector};
 
 /// A blob of gas at an instant: a Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,11 +91,15 @@ impl Blobs {
 
     /// Replaces blobs with a standard deviation of `size` (m) or more by four of half the variance, at the corners of a tetrahedron. Mass, centre
     /// and second moments of all together stay the same. The first takes the place of the blob, the others are the youngest.
-    pub(crate) fn split(&mut self, gas: &Gas, time: f64, size: f64, most: usize) -> Result<(), Error> {
+    pub(crate) fn split(&mut self, gas: &Gas, time: f64, settings: &Settings) -> Result<(), Error> {
+        let Settings { split: size, most, most_split, .. } = *settings;
         for blob in 0..self.len() {
             let variance = self.variance(blob, gas, time);
             if variance < size * size {
                 continue;
+            }
+            if self.len() + 3 > most_split {
+                return Ok(());
             }
             if self.len() + 3 > most {
                 return Err(Error::Blobs { most, time });

@@ -9,6 +9,7 @@ use std::sync::{Mutex, PoisonError};
 use dlsys_wind::Wind;
 
 use crate::blobs::Blobs;
+use crate::walls::Walls;
 use crate::{Error, Gas, Settings, Vector};
 
 /// Blobs that a thread takes at a time.
@@ -55,7 +56,12 @@ struct Chunk<'a> {
 
 impl Tick<'_> {
     /// Carries all blobs to the end. Each one by itself: their order and the number of threads do not matter.
-    pub(crate) fn carry(&self, blobs: &mut Blobs, wind: &(impl Wind + Sync)) -> Result<(), Error> {
+    pub(crate) fn carry(
+        &self,
+        blobs: &mut Blobs,
+        wind: &(impl Wind + Sync),
+        walls: &impl Walls,
+    ) -> Result<(), Error> {
         let threads = self.settings.threads.min(blobs.len().div_ceil(CHUNK)).max(1);
         let known =
             blobs.born.chunks(CHUNK).zip(blobs.since.chunks(CHUNK)).zip(blobs.variances.chunks(CHUNK));
@@ -69,7 +75,7 @@ impl Tick<'_> {
                 let next = chunks.lock().unwrap_or_else(PoisonError::into_inner).next();
                 let Some((number, chunk)) = next else { return failed };
                 // All chunks are tried, so that the error is that of the first blob with one, whichever thread has it.
-                if let Err(error) = self.carry_chunk(chunk, wind) {
+                if let Err(error) = self.carry_chunk(chunk, (wind, walls)) {
                     failed = failed.or(Some((number, error)));
                 }
             }
@@ -86,12 +92,12 @@ impl Tick<'_> {
         failed.map_or(Ok(()), |(_, error)| Err(error))
     }
 
-    fn carry_chunk(&self, chunk: Chunk, wind: &impl Wind) -> Result<(), Error> {
+    fn carry_chunk(&self, chunk: Chunk, around: (&impl Wind, &impl Walls)) -> Result<(), Error> {
         for (blob, moving) in chunk.moving.iter_mut().enumerate() {
             let begin = chunk.born[blob].max(self.begin);
             let age = (begin - chunk.since[blob]).max(0.0);
             let variance = chunk.variances[blob] + 2.0 * self.gas.diffusion * age;
-            self.go(moving, begin, self.settings.tolerance * libm::sqrt(variance), wind)?;
+            self.go(moving, begin, self.settings.tolerance * libm::sqrt(variance), around)?;
         }
         Ok(())
     }
@@ -104,11 +110,21 @@ impl Tick<'_> {
     }
 
     /// Carries a blob from a time to the end of the tick, with errors of steps below `allowed` (m).
-    fn go(&self, blob: &mut Moving, begin: f64, allowed: f64, wind: &impl Wind) -> Result<(), Error> {
+    fn go(
+        &self,
+        blob: &mut Moving,
+        begin: f64,
+        allowed: f64,
+        (wind, walls): (&impl Wind, &impl Walls),
+    ) -> Result<(), Error> {
         let (before, has_past) = (blob.velocity, blob.velocity.x.is_finite());
-        let gone = blob.known == 3 && self.adams(blob, allowed, wind);
-        if !gone {
-            self.runge_kutta(blob, begin, allowed, wind)?;
+        let level = walls.level(blob.centre);
+        let gone = blob.known == 3 && level == 0 && self.adams(blob, allowed, wind);
+        if gone {
+            blob.centre = walls.outside(blob.centre, self.end);
+        } else {
+            blob.level = blob.level.max(level);
+            self.runge_kutta(blob, begin, (allowed, level), (wind, walls))?;
         }
         if has_past {
             blob.past = [before, blob.past[0], blob.past[1]];
@@ -138,8 +154,8 @@ impl Tick<'_> {
         &self,
         blob: &mut Moving,
         begin: f64,
-        allowed: f64,
-        wind: &impl Wind,
+        (allowed, least): (f64, u8),
+        (wind, walls): (&impl Wind, &impl Walls),
     ) -> Result<(), Error> {
         let mut time = begin;
         if !blob.velocity.x.is_finite() {
@@ -163,11 +179,13 @@ impl Tick<'_> {
                     continue;
                 }
                 // A step of twice the length has eight times the error. It begins on its own grid.
-                if error < allowed / 16.0 && blob.level > 0 {
+                if error < allowed / 16.0 && blob.level > least {
                     blob.level -= 1;
                 }
             }
-            (blob.centre, blob.velocity, time) = (last, velocity, next);
+            let centre = walls.outside(last, next);
+            let velocity = if centre == last { velocity } else { self.velocity(centre, next, wind) };
+            (blob.centre, blob.velocity, time) = (centre, velocity, next);
         }
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! The blobs of one gas, from tick to tick.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use dlsys_wind::Wind;
 
@@ -8,6 +8,7 @@ use crate::blobs::{Birth, Blob, Blobs};
 use crate::carry::{Moving, Tick};
 use crate::chance::Chance;
 use crate::error::check;
+use crate::walls::{Open, Walls};
 use crate::{Error, Gas, Settings, Source, Vector};
 
 /// The blobs of a gas at an instant.
@@ -102,18 +103,37 @@ impl Cloud {
         }
     }
 
-    /// Goes on to the next tick. Sources must not have an identity in common.
+    /// Goes on to the next tick, in open air. Sources must not have an identity in common.
     ///
     /// # Errors
     ///
     /// A source without meaning, too many blobs, a wind without a value.
     pub fn advance(&mut self, sources: &[Source], wind: &(impl Wind + Sync)) -> Result<(), Error> {
+        self.advance_among(sources, wind, &Open)
+    }
+
+    /// Goes on to the next tick, with what no blob passes into.
+    ///
+    /// # Errors
+    ///
+    /// As of [`advance`](Cloud::advance).
+    pub fn advance_among(
+        &mut self,
+        sources: &[Source],
+        wind: &(impl Wind + Sync),
+        walls: &impl Walls,
+    ) -> Result<(), Error> {
         let end = (self.number + 1) as f64 * self.settings.tick;
-        self.go_on(end, sources, wind)?;
+        self.go_on(end, sources, (wind, walls))?;
         self.number += 1;
         self.blobs.end(&self.gas, end);
+        // Sources that are gone are forgotten.
+        if self.made.len() > sources.len() {
+            let known: BTreeSet<u64> = sources.iter().map(|source| source.id).collect();
+            self.made.retain(|id, _| known.contains(id));
+        }
         if self.settings.split < f64::INFINITY {
-            self.blobs.split(&self.gas, end, self.settings.split, self.settings.most)?;
+            self.blobs.split(&self.gas, end, &self.settings)?;
         }
         Ok(())
     }
@@ -124,6 +144,21 @@ impl Cloud {
     ///
     /// As of [`advance`](Cloud::advance); a time that is not between these ticks.
     pub fn shown(&self, time: f64, sources: &[Source], wind: &(impl Wind + Sync)) -> Result<Cloud, Error> {
+        self.shown_among(time, sources, wind, &Open)
+    }
+
+    /// The same with what no blob passes into.
+    ///
+    /// # Errors
+    ///
+    /// As of [`shown`](Cloud::shown).
+    pub fn shown_among(
+        &self,
+        time: f64,
+        sources: &[Source],
+        wind: &(impl Wind + Sync),
+        walls: &impl Walls,
+    ) -> Result<Cloud, Error> {
         let (begin, end) = (self.time, (self.number + 1) as f64 * self.settings.tick);
         check("a time (s)", time, time >= begin && time <= end, "a time from the present tick to the next")?;
         let mut shown = self.clone();
@@ -134,11 +169,11 @@ impl Cloud {
             shown.bear(source, end)?;
         }
         let first = shown.blobs.moving.clone();
-        shown.carry(end, wind)?;
+        shown.carry(end, (wind, walls))?;
         for (blob, from) in first.iter().enumerate() {
             let since = shown.blobs.born[blob].max(begin);
             let to = &mut shown.blobs.moving[blob];
-            to.centre = cubic((from, since), (to, end), time);
+            to.centre = walls.outside(cubic((from, since), (to, end), time), time);
         }
         shown.blobs.keep(|born| born <= time);
         shown.time = time;
@@ -146,37 +181,54 @@ impl Cloud {
     }
 
     /// Births and motion up to the next tick.
-    fn go_on(&mut self, end: f64, sources: &[Source], wind: &(impl Wind + Sync)) -> Result<(), Error> {
+    fn go_on(
+        &mut self,
+        end: f64,
+        sources: &[Source],
+        around: (&(impl Wind + Sync), &impl Walls),
+    ) -> Result<(), Error> {
         for source in sources {
             self.bear(source, end)?;
         }
-        self.carry(end, wind)?;
+        self.carry(end, around)?;
         self.time = end;
         Ok(())
     }
 
-    fn carry(&mut self, end: f64, wind: &(impl Wind + Sync)) -> Result<(), Error> {
+    fn carry(&mut self, end: f64, (wind, walls): (&(impl Wind + Sync), &impl Walls)) -> Result<(), Error> {
         let tick = Tick { gas: &self.gas, settings: &self.settings, begin: self.time, end };
-        tick.carry(&mut self.blobs, wind)
+        tick.carry(&mut self.blobs, wind, walls)
     }
 
-    /// The blobs that a source makes from the present tick to a time, evenly over time.
+    /// The blobs that a source makes from the present tick to a time.
     fn bear(&mut self, source: &Source, end: f64) -> Result<(), Error> {
         source.check()?;
-        let (number, due) = self.made.get(&source.id).copied().unwrap_or_default();
-        let all = due + source.rate * (end - self.time);
+        let [begin, until] = source.during.unwrap_or([self.time, end]);
+        check(
+            "a time of a source (s)",
+            begin,
+            begin >= self.time && begin <= until,
+            "a time within the tick",
+        )?;
+        check("a time of a source (s)", until, until <= end, "a time within the tick")?;
+        let before = self.made.get(&source.id).copied();
+        let before = before.or_else(|| self.made.remove(&source.predecessor?));
+        let (number, due) = before.unwrap_or((0, source.phase));
+        let lasts = until - begin;
+        let [first, last] = source.rate;
+        let all = due + 0.5 * (first + last) * lasts;
         if all >= self.settings.most as f64 + 1.0 {
             return Err(Error::Blobs { most: self.settings.most, time: self.time });
         }
         let count = libm::floor(all);
         self.room(count as usize)?;
-        let chance = Chance::new(0x6761_7365).of(source.id);
+        let chance = Chance::new(0x6761_7365 ^ self.settings.seed).of(source.id);
         for k in 0..count as u64 {
-            let since = ((k + 1) as f64 - due) / source.rate;
-            let born = self.time + since;
+            let since = source.time_of((k + 1) as f64 - due, lasts);
+            let (born, part) = (begin + since, if lasts > 0.0 { since / lasts } else { 0.0 });
             let chance = chance.of(number + k);
-            let centre =
-                source.from.lerp(&source.to, since / self.settings.tick) + chance.in_ball() * source.radius;
+            let radius = source.radius[0] + (source.radius[1] - source.radius[0]) * part;
+            let centre = source.from.lerp(&source.to, part) + chance.in_ball() * radius;
             let variance = self.gas.size * self.gas.size;
             self.blobs.push(Birth { centre, born, since: born, variance, share: 1.0, chance });
         }

@@ -14,8 +14,8 @@ pub struct Gas {
     pub size: f64,
     /// Mass of a new blob, in kg.
     pub mass: f64,
-    /// Speed relative to the air at which blobs sink, in m/s; negative ones rise. Bodies turn the wind aside, not this speed: with it, blobs pass into
-    /// a body.
+    /// Speed relative to the air at which blobs sink, in m/s; negative ones rise. Bodies turn the wind aside, not this speed: what is
+    /// in its way is for [`Walls`](crate::Walls).
     pub fall: f64,
 }
 
@@ -38,33 +38,62 @@ impl Gas {
     }
 }
 
-/// Where blobs begin during a tick.
+/// Where blobs begin during a tick. Values that change do so evenly from the first to the second one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Source {
     /// Its identity: random numbers and counts of blobs belong to it.
     pub id: u64,
-    /// Its centre at the beginning of the tick, in m.
+    /// The identity of the source whose place it takes, if there is one: the part of a blob that was due there is due here.
+    pub predecessor: Option<u64>,
+    /// The part of a blob that is due when it begins, from 0 to 1, without a predecessor.
+    pub phase: f64,
+    /// When it begins and ends, in s, within the tick; `None` is the whole tick.
+    pub during: Option<[f64; 2]>,
+    /// Its centre at these times, in m.
     pub from: Vector,
-    /// Its centre at the end of the tick, in m.
+    /// See `from`.
     pub to: Vector,
-    /// Blobs begin within this distance of the centre, uniformly, in m.
-    pub radius: f64,
+    /// Blobs begin within these distances of the centre, uniformly, in m.
+    pub radius: [f64; 2],
     /// Blobs in a second.
-    pub rate: f64,
+    pub rate: [f64; 2],
 }
 
 impl Source {
-    /// A source that does not move.
+    /// A source that does not change.
     pub fn at(id: u64, centre: Vector, radius: f64, rate: f64) -> Source {
-        Source { id, from: centre, to: centre, radius, rate }
+        Source {
+            id,
+            predecessor: None,
+            phase: 0.0,
+            during: None,
+            from: centre,
+            to: centre,
+            radius: [radius; 2],
+            rate: [rate; 2],
+        }
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
         for value in self.from.iter().chain(self.to.iter()) {
             check("a coordinate of a source (m)", *value, true, "a finite number")?;
         }
-        check("a radius of a source (m)", self.radius, self.radius >= 0.0, "0 or more")?;
-        check("a rate of a source (1/s)", self.rate, self.rate >= 0.0, "0 or more")
+        for radius in self.radius {
+            check("a radius of a source (m)", radius, radius >= 0.0, "0 or more")?;
+        }
+        for rate in self.rate {
+            check("a rate of a source (1/s)", rate, rate >= 0.0, "0 or more")?;
+        }
+        check("a phase of a source", self.phase, (0.0..=1.0).contains(&self.phase), "0 to 1")
+    }
+
+    /// The time after its beginning at which so many blobs have begun, if it lasts for a time (both in s): the root of a square equation
+    /// without cancellation.
+    pub(crate) fn time_of(&self, count: f64, lasts: f64) -> f64 {
+        let [first, last] = self.rate;
+        let growth = (last - first) / lasts;
+        let root = libm::sqrt((first * first + 2.0 * growth * count).max(0.0));
+        (2.0 * count / (first + root)).clamp(0.0, lasts)
     }
 }
 
@@ -82,8 +111,12 @@ pub struct Settings {
     /// Standard deviation at which a blob is replaced by four with 1/√2 of it, in m; infinite: never. It should be that of the smallest eddies, and
     /// is at least twice the [size](Gas::size) of new blobs.
     pub split: f64,
+    /// Blobs are not replaced by smaller ones if there would be more than so many then.
+    pub most_split: usize,
     /// Largest number of blobs; more are an error.
     pub most: usize,
+    /// Another one gives other random numbers.
+    pub seed: u64,
     /// Number of threads. The result does not depend on it.
     pub threads: usize,
 }
@@ -97,6 +130,8 @@ impl Default for Settings {
             deepest: 10,
             fixed: false,
             split: f64::INFINITY,
+            most_split: 10_000_000,
+            seed: 0,
             most: 10_000_000,
             threads: 1,
         }

@@ -7,6 +7,7 @@
 //! - [`Gas`]: diffusion, decay, size and mass of new blobs, speed of fall.
 //! - [`Source`]: where blobs begin, and how many in a second.
 //! - [`Cloud`]: the blobs of a gas at an instant; goes on from tick to tick.
+//! - [`Walls`]: bodies and ground that no blob passes into.
 //! - [`Breeze`]: a [`Field`](dlsys_wind::Field) as the wind of a tick.
 //! - [`Smoke`], [`Look`], [`Light`]: transmittance along a ray, and light that is scattered or emitted towards its origin.
 //! - [`study`]: exact cases with their errors and orders.
@@ -63,6 +64,7 @@ mod ray;
 mod smoke;
 pub mod study;
 mod tree;
+mod walls;
 
 pub use blobs::Blob;
 pub use breeze::Breeze;
@@ -72,6 +74,7 @@ pub use gas::{Gas, Settings, Source};
 pub use light::{Light, Look};
 pub use ray::{Ray, Span};
 pub use smoke::Smoke;
+pub use walls::{Open, Walls};
 
 /// A vector of three components.
 pub type Vector = nalgebra::Vector3<f64>;

@@ -3,24 +3,31 @@
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::check;
-use crate::ray::between;
+use crate::ray::HalfErf;
 use crate::tree::Tree;
 use crate::{Blob, Error, Light, Look, Ray, Span, Vector};
 
-/// The blobs of a gas in light, at an instant.
+/// The blobs of gases in light, at an instant.
 ///
 /// Transmittance is exact but for the cut of blobs at their reach. Light is that of the paper's equations 22 to 27 with single scattering: each blob is lit as
 /// its centre is, behind the gas between it and the lights, and a ray adds up intervals front to back.
 #[derive(Clone, Debug)]
 pub struct Smoke {
-    look: Look,
+    looks: Vec<Look>,
     /// Sorted by the tree.
-    blobs: Vec<Blob>,
+    puffs: Vec<Puff>,
     /// What each blob scatters and emits, in the order of the blobs.
     colours: Vec<[f64; 3]>,
     tree: Tree,
     reach: f64,
     intervals: usize,
+}
+
+/// A blob with the number of its look. Its mass is times the extinction, an area in m².
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Puff {
+    pub(crate) blob: Blob,
+    look: u32,
 }
 
 /// Distance in standard deviations at which a blob ends: 1.5e-8 of its density at the centre.
@@ -34,7 +41,7 @@ const CHUNK: usize = 256;
 struct Passed {
     blob: usize,
     along: f64,
-    /// Mass along the whole line, in kg/m².
+    /// Optical depth of the whole line.
     through: f64,
 }
 
@@ -54,11 +61,29 @@ impl Smoke {
     /// # Errors
     ///
     /// A look or a distance out of range.
-    pub fn cut(look: Look, mut blobs: Vec<Blob>, reach: f64) -> Result<Smoke, Error> {
-        look.check()?;
+    pub fn cut(look: Look, blobs: Vec<Blob>, reach: f64) -> Result<Smoke, Error> {
+        Smoke::of(vec![(look, blobs)], reach)
+    }
+
+    /// Several gases in one place.
+    ///
+    /// # Errors
+    ///
+    /// As of [`cut`](Smoke::cut).
+    pub fn of(gases: Vec<(Look, Vec<Blob>)>, reach: f64) -> Result<Smoke, Error> {
         check("a reach of blobs", reach, (1.0..=40.0).contains(&reach), "1 to 40")?;
-        let tree = Tree::new(&mut blobs, reach);
-        Ok(Smoke { look, blobs, colours: Vec::new(), tree, reach, intervals: INTERVALS })
+        let (mut looks, mut puffs) = (Vec::new(), Vec::new());
+        for (number, (look, blobs)) in gases.into_iter().enumerate() {
+            look.check()?;
+            looks.push(look);
+            let puff = |blob: Blob| Puff {
+                blob: Blob { mass: blob.mass * look.extinction, ..blob },
+                look: number as u32,
+            };
+            puffs.extend(blobs.into_iter().map(puff));
+        }
+        let tree = Tree::new(&mut puffs, reach);
+        Ok(Smoke { looks, puffs, colours: Vec::new(), tree, reach, intervals: INTERVALS })
     }
 
     /// The same with another number of intervals along a ray (48). The error of light is of order 2 in their length; transmittance has none.
@@ -71,15 +96,29 @@ impl Smoke {
     /// # Errors
     ///
     /// A light without meaning.
-    pub fn lit(mut self, lights: &[Light], threads: usize) -> Result<Smoke, Error> {
+    pub fn lit(self, lights: &[Light], threads: usize) -> Result<Smoke, Error> {
+        self.lit_among(lights, &|_| 1.0, threads)
+    }
+
+    /// Lights the blobs where something else may hide distant lights: they shine on a place with this part of their light.
+    ///
+    /// # Errors
+    ///
+    /// A light without meaning.
+    pub fn lit_among(
+        mut self,
+        lights: &[Light],
+        visible: &(dyn Fn(&Vector) -> f64 + Sync),
+        threads: usize,
+    ) -> Result<Smoke, Error> {
         lights.iter().try_for_each(Light::check)?;
-        let mut colours = vec![[0.0; 3]; self.blobs.len()];
-        let chunks = Mutex::new(colours.chunks_mut(CHUNK).zip(self.blobs.chunks(CHUNK)));
+        let mut colours = vec![[0.0; 3]; self.puffs.len()];
+        let chunks = Mutex::new(colours.chunks_mut(CHUNK).zip(self.puffs.chunks(CHUNK)));
         let work = || loop {
             let next = chunks.lock().unwrap_or_else(PoisonError::into_inner).next();
-            let Some((colours, blobs)) = next else { return };
-            for (colour, blob) in colours.iter_mut().zip(blobs) {
-                *colour = self.source(&blob.centre, lights);
+            let Some((colours, puffs)) = next else { return };
+            for (colour, puff) in colours.iter_mut().zip(puffs) {
+                *colour = self.source(puff, lights, visible);
             }
         };
         std::thread::scope(|scope| {
@@ -92,25 +131,21 @@ impl Smoke {
         Ok(self)
     }
 
-    /// The look of the gas.
-    pub fn look(&self) -> &Look {
-        &self.look
-    }
-
-    /// Equation 24: what the gas at a point scatters and emits.
-    fn source(&self, point: &Vector, lights: &[Light]) -> [f64; 3] {
+    /// Equation 24: what the gas in the middle of a blob scatters and emits.
+    fn source(&self, puff: &Puff, lights: &[Light], visible: &(dyn Fn(&Vector) -> f64 + Sync)) -> [f64; 3] {
         let mut light = [0.0; 3];
+        let point = puff.blob.centre;
         for source in lights {
             let (share, colour) = match source {
                 Light::Ambient(colour) => (1.0, colour),
                 Light::Distant { towards, colour } => {
-                    let ray = Ray { origin: *point, direction: *towards };
-                    (self.transmittance(&ray, Span::ALL), colour)
+                    let ray = Ray { origin: point, direction: *towards };
+                    (self.transmittance(&ray, Span::ALL) * visible(&point), colour)
                 }
             };
             light = std::array::from_fn(|k| light[k] + share * colour[k]);
         }
-        let Look { albedo, glow, .. } = self.look;
+        let Look { albedo, glow, .. } = self.looks[puff.look as usize];
         std::array::from_fn(|k| albedo[k] * light[k] + (1.0 - albedo[k]) * glow[k])
     }
 
@@ -118,7 +153,7 @@ impl Smoke {
     fn passed(&self, ray: &Ray, span: Span, mut found: impl FnMut(Passed)) {
         self.tree.along(ray, span, |range| {
             for blob in range {
-                let Blob { centre, variance, .. } = self.blobs[blob];
+                let Blob { centre, variance, .. } = self.puffs[blob].blob;
                 let (along, square) = ray.nearest(&centre);
                 let room = self.reach * self.reach * variance - square;
                 if room < 0.0 {
@@ -126,7 +161,7 @@ impl Smoke {
                 }
                 let half = libm::sqrt(room);
                 if along + half > span.from && along - half < span.to {
-                    found(Passed { blob, along, through: self.blobs[blob].through(square) });
+                    found(Passed { blob, along, through: self.puffs[blob].blob.through(square) });
                 }
             }
         });
@@ -134,12 +169,12 @@ impl Smoke {
 
     /// ∫κ_t ρ ds along a span of a ray: the optical depth.
     pub fn depth(&self, ray: &Ray, span: Span) -> f64 {
-        let mut mass = 0.0;
+        let (mut depth, table) = (0.0, HalfErf::table());
         self.passed(ray, span, |Passed { blob, along, through }| {
-            let unit = 1.0 / libm::sqrt(2.0 * self.blobs[blob].variance);
-            mass += through * between((span.from - along) * unit, (span.to - along) * unit);
+            let unit = 1.0 / libm::sqrt(2.0 * self.puffs[blob].blob.variance);
+            depth += through * table.between((span.from - along) * unit, (span.to - along) * unit);
         });
-        self.look.extinction * mass
+        depth
     }
 
     /// The part of light that passes a span of a ray: e^(-depth).
@@ -152,7 +187,7 @@ impl Smoke {
     pub fn light(&self, ray: &Ray, span: Span) -> ([f64; 3], f64) {
         let mut passed = Vec::new();
         self.passed(ray, span, |blob| passed.push(blob));
-        let half = |found: &Passed| self.reach * libm::sqrt(self.blobs[found.blob].variance);
+        let half = |found: &Passed| self.reach * libm::sqrt(self.puffs[found.blob].blob.variance);
         let from = passed.iter().map(|found| found.along - half(found)).fold(f64::INFINITY, f64::min);
         let to = passed.iter().map(|found| found.along + half(found)).fold(f64::NEG_INFINITY, f64::max);
         let (from, to) = (from.max(span.from), to.min(span.to));
@@ -160,16 +195,16 @@ impl Smoke {
             return ([0.0; 3], 1.0);
         }
         let width = (to - from) / self.intervals as f64;
-        // Mass in each interval, and what it scatters and emits.
+        // Optical depth of each interval, and what it scatters and emits.
         let mut intervals = vec![[0.0; 4]; self.intervals];
         for found in &passed {
             self.share_out(found, (from, width), half(found), &mut intervals);
         }
         let (mut colour, mut left) = ([0.0; 3], 1.0);
-        for [red, green, blue, mass] in intervals {
-            if mass > 0.0 {
-                let passing = libm::exp(-self.look.extinction * mass);
-                let share = left * (1.0 - passing) / mass;
+        for [red, green, blue, depth] in intervals {
+            if depth > 0.0 {
+                let passing = libm::exp(-depth);
+                let share = left * (1.0 - passing) / depth;
                 for (sum, value) in colour.iter_mut().zip([red, green, blue]) {
                     *sum += share * value;
                 }
@@ -181,19 +216,20 @@ impl Smoke {
 
     /// Adds the mass of a blob to the intervals that it reaches into.
     fn share_out(&self, found: &Passed, (from, width): (f64, f64), half: f64, intervals: &mut [[f64; 4]]) {
-        let unit = 1.0 / libm::sqrt(2.0 * self.blobs[found.blob].variance);
+        let unit = 1.0 / libm::sqrt(2.0 * self.puffs[found.blob].blob.variance);
         let [red, green, blue] = self.colours.get(found.blob).copied().unwrap_or_default();
         let last = intervals.len() - 1;
         // Saturates below 0.
         let index = |distance: f64| (((distance - from) / width) as usize).min(last);
         let (first, end) = (index(found.along - half), index(found.along + half));
-        let at = |index: usize| (from + width * index as f64 - found.along) * unit;
+        let table = HalfErf::table();
+        let at = |index: usize| table.at((from + width * index as f64 - found.along) * unit);
         let mut before = at(first);
         for (place, interval) in intervals.iter_mut().enumerate().take(end + 1).skip(first) {
             let after = at(place + 1);
-            let mass = found.through * between(before, after);
+            let depth = found.through * (after - before);
             for (sum, value) in interval.iter_mut().zip([red, green, blue, 1.0]) {
-                *sum += mass * value;
+                *sum += depth * value;
             }
             before = after;
         }

@@ -1,6 +1,7 @@
 //! A tree of boxes around blobs: those that a ray passes, without a look at all others.
 
-use crate::{Blob, Ray, Span, Vector};
+use crate::smoke::Puff;
+use crate::{Ray, Span, Vector};
 
 /// Blobs in a leaf at most.
 const LEAF: usize = 8;
@@ -23,32 +24,32 @@ struct Node {
 
 impl Tree {
     /// Sorts blobs so that each leaf has a range of them. Their spheres have a radius of `reach` standard deviations.
-    pub(crate) fn new(blobs: &mut [Blob], reach: f64) -> Tree {
-        let mut tree = Tree { nodes: Vec::with_capacity(blobs.len() / 2) };
-        if !blobs.is_empty() {
-            tree.build(blobs, 0, reach);
+    pub(crate) fn new(puffs: &mut [Puff], reach: f64) -> Tree {
+        let mut tree = Tree { nodes: Vec::with_capacity(puffs.len() / 2) };
+        if !puffs.is_empty() {
+            tree.build(puffs, 0, reach);
         }
         tree
     }
 
     /// Depth is at most the logarithm of the number of blobs.
-    fn build(&mut self, blobs: &mut [Blob], first: usize, reach: f64) {
+    fn build(&mut self, puffs: &mut [Puff], first: usize, reach: f64) {
         let (mut low, mut high) = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
         let (mut least, mut most) = (low, high);
-        for blob in &*blobs {
+        for Puff { blob, .. } in &*puffs {
             let radius = Vector::repeat(reach * libm::sqrt(blob.variance));
             (low, high) = (low.inf(&(blob.centre - radius)), high.sup(&(blob.centre + radius)));
             (least, most) = (least.inf(&blob.centre), most.sup(&blob.centre));
         }
         let node = self.nodes.len();
-        self.nodes.push(Node { low, high, first: first as u32, count: blobs.len() as u32 });
-        if blobs.len() <= LEAF {
+        self.nodes.push(Node { low, high, first: first as u32, count: puffs.len() as u32 });
+        if puffs.len() <= LEAF {
             return;
         }
         let axis = (most - least).imax();
-        let middle = blobs.len() / 2;
-        blobs.select_nth_unstable_by(middle, |a, b| a.centre[axis].total_cmp(&b.centre[axis]));
-        let (before, after) = blobs.split_at_mut(middle);
+        let middle = puffs.len() / 2;
+        puffs.select_nth_unstable_by(middle, |a, b| a.blob.centre[axis].total_cmp(&b.blob.centre[axis]));
+        let (before, after) = puffs.split_at_mut(middle);
         self.build(before, first, reach);
         let second = self.nodes.len() as u32;
         self.build(after, first + middle, reach);

@@ -11,6 +11,8 @@ const SETTINGS: Settings = Settings {
     deepest: 10,
     fixed: false,
     split: f64::INFINITY,
+    most_split: 10_000_000,
+    seed: 0,
     most: 10_000_000,
     threads: 1,
 };
@@ -27,7 +29,7 @@ fn wind(point: Vector, time: f64) -> Vector {
 fn sources(tick: u64) -> [Source; 2] {
     let moved = |tick: u64| Vector::new(0.01 * tick as f64, 0.0, 0.0);
     [
-        Source { id: 7, from: moved(tick), to: moved(tick + 1), radius: 0.1, rate: 900.0 },
+        Source { to: moved(tick + 1), ..Source::at(7, moved(tick), 0.1, 900.0) },
         Source::at(8, Vector::new(0.5, 0.5, 0.0), 0.0, 133.3),
     ]
 }

@@ -33,6 +33,7 @@
 mod blend;
 mod error;
 mod follow;
+mod gases;
 mod glb;
 mod life;
 mod mesh;
@@ -54,6 +55,7 @@ use dlsys_session::{Nursery, Session, sways};
 use dlsys_sim::Settings;
 pub use error::Error;
 use follow::{Closeness, Follower};
+use gases::GasTrack;
 use life::{Lives, Tolerance};
 use mesh::Cutter;
 use motion::Clock;
@@ -121,6 +123,8 @@ pub struct Options {
     pub metres: f64,
     /// Height of the floor, if there is one, its middle (x, z), and half of its side, in units of the model.
     pub floor: Option<[f64; 4]>,
+    /// Gases are followed, too: at the frames, as points. For USDA; GLB files do not hold them.
+    pub gases: bool,
     /// Number of threads; the file does not depend on it.
     pub threads: usize,
     /// Bounds of the work.
@@ -143,6 +147,7 @@ impl Options {
             seconds: units.time,
             metres: units.length,
             floor: None,
+            gases: false,
             threads: 1,
             limits: Limits::default(),
         }
@@ -169,6 +174,7 @@ pub struct Growth {
     rules: Vec<String>,
     tracks: Tracks,
     lives: Lives,
+    gases: Vec<GasTrack>,
 }
 
 /// Seconds within which something that appears without a production may be early or late.
@@ -197,7 +203,7 @@ pub fn grow(
         return Err(Error::TooLong { seconds, limit: Options::LONGEST });
     }
     let settings = Settings { log: true, ..settings };
-    let nursery = Nursery::new(model, settings);
+    let nursery = Nursery::new(model, settings).without_gases();
     let mut blank = nursery.blank();
     blank.notes_poses = true;
     let tolerance = options.tolerance();
@@ -220,6 +226,10 @@ pub fn grow(
     };
     follower.follow(times, progress)?;
     let tracks = follower.tracks;
+    let gases = match options.gases && dlsys_geometry::turtle::lets_out(model) {
+        true => gases::follow(session, settings, times, options, progress)?,
+        false => Vec::new(),
+    };
     let allowed = Tolerance { likeness: 0.25 * tolerance, mix: 0.08 * tolerance };
     let lives = life::lives(&tracks.phases, allowed, 2.0 * instant);
     Ok(Growth {
@@ -233,6 +243,7 @@ pub fn grow(
         rules: model.rules.iter().map(|rule| rule.label.clone()).collect(),
         tracks,
         lives,
+        gases,
     })
 }
 

@@ -138,6 +138,10 @@ pub const GROUND: &str = "@G";
 /// name instead.
 pub const ELASTIC: &str = "@E";
 
+/// The command that lets blobs of a gas begin: `@S(GAS, rate, radius)`; without a radius they begin at one point. A model may declare a
+/// surface or a drawing of this name instead.
+pub const SOURCE: &str = "@S";
+
 /// The command that lets go what follows, to the end of the branch. A model may declare a surface or a drawing of this name
 /// instead.
 pub const DETACH: &str = "@D";

@@ -55,10 +55,10 @@ pub use condition::{Condition, ConditionStep};
 pub use dlsys_expr::{Comparison, Fold, Sign, Truth};
 pub use kind::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DETACH, DRAWN_WORDS, ELASTIC, GROUND, Kind, KindId,
-    Kinds, SURFACE_SIZES, Strain, base_of, class_of,
+    Kinds, SOURCE, SURFACE_SIZES, Strain, base_of, class_of,
 };
 pub use measure::Measure;
-pub use physics::{FieldCache, Flow, Primitive, Spectrum, Tissue, Units, Wind};
+pub use physics::{FieldCache, Flow, Gas, Primitive, Spectrum, Tissue, Units, Wind};
 pub use picture::{Drawn, Footprint, Picture, Texture};
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Switch};

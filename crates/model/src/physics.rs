@@ -6,6 +6,8 @@ use std::sync::{Arc, OnceLock};
 use dlsys_diagnostic::Span;
 use dlsys_expr::Program;
 
+use crate::Rgb;
+
 /// `units length M, time S`: what a unit of the model is in SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Units {
@@ -57,6 +59,45 @@ impl Tissue {
     /// True if its stiffness does not follow the time.
     pub fn is_constant(&self) -> bool {
         self.stiffness.constants().is_some()
+    }
+}
+
+/// `gas NAME = size S, mass M, extinction X, …`: smoke, steam, mist or pollen, as blobs that the wind carries.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gas {
+    /// The name, which stands for its number (from 1) in expressions.
+    pub name: Arc<str>,
+    /// Diffusivity in m²/s.
+    pub diffusion: f64,
+    /// Rate of decay in 1/s.
+    pub decay: f64,
+    /// Standard deviation of a new blob in m.
+    pub size: f64,
+    /// Mass of a new blob in kg.
+    pub mass: f64,
+    /// Extinction in m²/kg.
+    pub extinction: f64,
+    /// The part of what is taken from light that is scattered, 0 to 1.
+    pub albedo: f64,
+    /// Strength of the light that it emits.
+    pub glow: f64,
+    /// The speed at which it sinks in still air, in m/s; negative: it rises.
+    pub fall: f64,
+    /// Its colour in full light.
+    pub color: Rgb,
+    /// The place of the declaration in the text.
+    pub span: Span,
+}
+
+impl Gas {
+    /// The colour if the text gives none.
+    pub const COLOR: Rgb = 0xff_ff_ff;
+    /// The part of its mass with which a blob ends.
+    pub const FAINTEST: f64 = 1e-3;
+
+    /// Seconds that a blob lasts; infinite without decay.
+    pub fn life(&self) -> f64 {
+        if self.decay > 0.0 { -Gas::FAINTEST.ln() / self.decay } else { f64::INFINITY }
     }
 }
 

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::{FieldCache, Flow, KindId, Model, Rgb, Tissue, Units, Wind};
+use crate::{FieldCache, Flow, Gas, KindId, Model, Rgb, Tissue, Units, Wind};
 use dlsys_diagnostic::{Source, Span};
 use dlsys_expr::Program;
 
 /// The declarations of a model that concern its surroundings: `plant`, `light`, `sky`, `camera`, `ground`, `units`, `wind`, `flow`,
-/// `tissue`, `solid`.
+/// `tissue`, `gas`, `solid`.
 #[derive(Clone, Debug, Default)]
 pub struct Scenery {
     /// In the order written.
@@ -28,6 +28,8 @@ pub struct Scenery {
     pub flows: Vec<Flow>,
     /// In the order written; their names stand for their numbers, from 1.
     pub tissues: Vec<Tissue>,
+    /// In the order written; their names stand for their numbers, from 1.
+    pub gases: Vec<Gas>,
     /// The kinds of modules whose drawings are solid bodies, in the order written, with the places of their names.
     pub solids: Vec<(KindId, Span)>,
     /// The field of the wind.

@@ -73,6 +73,12 @@ impl Camera {
         Camera { view, eye: Some(Eye { x, y, focus, distance }) }
     }
 
+    /// Where the eye is in space; `None` without perspective.
+    pub(super) fn eye(&self) -> Option<Point> {
+        let eye = self.eye.as_ref()?;
+        Some(Point::from(self.view.space(Vector::new(eye.x, eye.y, eye.focus + eye.distance))))
+    }
+
     /// The camera that has gone round the axis y by this angle, in degrees.
     pub(super) fn turned(self, degrees: f64) -> Camera {
         // The eye is given in the axes of the view, which turn with it.

@@ -60,6 +60,7 @@ mod floor;
 mod formats;
 mod frames;
 mod glyphs;
+mod haze;
 mod layout;
 mod lengths;
 mod lens;

@@ -4,6 +4,7 @@
 //! sun. So pictures of pixels and of regions have the same shading.
 
 use super::casters::Casters;
+use super::haze::{self, Haze};
 use super::lens::Lens;
 use super::light::{GLOSS, SHARPNESS, Spot, TRANSMITTED};
 use super::shadow::Maps;
@@ -63,6 +64,7 @@ pub(super) struct Lighting<'a> {
     open_sky: Option<OpenSky>,
     /// The colour of the floor under a declared sky.
     ground: Option<Color>,
+    haze: Option<Haze>,
 }
 
 impl<'a> Lighting<'a> {
@@ -102,7 +104,33 @@ impl<'a> Lighting<'a> {
             Some(maps)
         });
         let ground = around.sky.map(|[_, horizon]| between(horizon, EARTH, EARTHY));
-        Lighting { fit, declared, maps: maps.flatten(), floor, open_sky, ground }
+        let maps = maps.flatten();
+        let visible = |at: &Vector| match (&maps, sun) {
+            (Some(maps), Some(sun)) => maps.sun(*at, sun),
+            _ => 1.0,
+        };
+        let around = haze::Around {
+            sun,
+            tint: declared.as_ref().map(|declared| declared.tint),
+            is_flat: fit.light.is_flat(),
+            visible: &visible,
+        };
+        let haze = Haze::new(scene, fit.camera, &around, threads);
+        Lighting { fit, declared, maps, floor, open_sky, ground, haze }
+    }
+
+    /// The gases in front of what is seen.
+    pub(super) fn haze(&self) -> Option<&Haze> {
+        self.haze.as_ref()
+    }
+
+    /// The part of the sun's light that comes to a point on a surface whose lit side has this normal, past plants and through gases.
+    fn sunlight(&self, at: Vector, normal: Vector, sun: Vector) -> f64 {
+        let past = self.maps.as_ref().map_or(1.0, |maps| maps.sun(at, normal));
+        match &self.haze {
+            Some(haze) if past > 0.0 => past * haze.sunlight(at, sun),
+            _ => past,
+        }
     }
 
     /// Strength of light at a place; 1 leaves a colour as it is.
@@ -125,7 +153,7 @@ impl<'a> Lighting<'a> {
             let part = if spot.is_thin && cos < 0.0 { -cos * TRANSMITTED } else { cos.max(0.0) };
             if part > 0.0 {
                 let lit_side = if cos < 0.0 { -normal } else { normal };
-                let visible = self.maps.as_ref().map_or(1.0, |maps| maps.sun(at, lit_side));
+                let visible = self.sunlight(at, lit_side, sun);
                 let half = (sun + view.towards()).try_normalize(1e-9).unwrap_or(sun);
                 let gloss = if cos > 0.0 { normal.dot(&half).max(0.0).powi(SHARPNESS) * GLOSS } else { 0.0 };
                 strength += visible * (SUN * part + gloss);
@@ -190,14 +218,13 @@ impl<'a> Lighting<'a> {
         let (centre, extent) = self.fit.middle();
         let away = ((at.x - centre.x).hypot(at.z - centre.z) / (POOL_REACH * extent)).powi(2);
         let pool = 1.0 - POOL * (-away).exp();
-        let (Some(maps), Some(open_sky)) = (&self.maps, &self.open_sky) else { return pool };
-        let sky = open_sky.at(at);
+        let sky = self.open_sky.as_ref().map_or(1.0, |open_sky| open_sky.at(at));
         let light = match &self.declared {
             None => 1.0 - CONTACT * (1.0 - sky),
             Some(declared) => {
                 let (mut here, mut open) = (declared.sky * sky + 0.04, declared.sky + 0.04);
                 if let Some(sun) = declared.sun.filter(|sun| sun.y > 0.0) {
-                    here += SUN * sun.y * maps.sun(at, Vector::y());
+                    here += SUN * sun.y * self.sunlight(at, Vector::y(), sun);
                     open += SUN * sun.y;
                 }
                 here / open

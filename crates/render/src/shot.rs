@@ -11,7 +11,7 @@ use super::lighting::Lighting;
 use super::mapping::{Cut, Mapping, Pinned};
 use super::raster::{self, Image, Pattern, Place};
 use super::stage::{Part, Stage};
-use dlsys_geometry::scene::{Color, Texture, Vector};
+use dlsys_geometry::scene::{Color, Point, Texture, Vector};
 
 /// Most triangles that are in memory at a time: a picture with more is drawn in strips, if these have fewer.
 const MOST: usize = 6_000_000;
@@ -310,11 +310,29 @@ impl raster::Triangles for Shot<'_> {
         Cut::new(texture, pinned, count)
     }
 
+    fn is_veiled(&self) -> bool {
+        self.lighting.haze().is_some()
+    }
+
+    fn open(&self, pixel: [usize; 2]) -> [u8; 4] {
+        let haze = self.lighting.haze();
+        haze.map_or([0; 4], |haze| haze.over(self.lens.middle(pixel), false, [0; 4]))
+    }
+
     fn shade(&self, n: usize, pixel: [usize; 2], weights: [f64; 3]) -> [u8; 4] {
-        let face = &self.faces[n];
         let [p, q, r] = self.corners(n);
         let depth = (0..3).map(|k| f64::from([p, q, r][k].depth) * weights[k]).sum();
         let seen = self.lens.seen(pixel, depth);
+        let shade = self.surface_shade(n, seen, weights);
+        self.lighting.haze().map_or(shade, |haze| haze.over(seen, true, shade))
+    }
+}
+
+impl Shot<'_> {
+    /// The colour of a triangle at a place that the camera projects here.
+    fn surface_shade(&self, n: usize, seen: Point, weights: [f64; 3]) -> [u8; 4] {
+        let face = &self.faces[n];
+        let [p, q, r] = face.corners.map(|corner| self.places[corner as usize]);
         if face.look == FLOOR {
             return self.lighting.floor_color(seen);
         }

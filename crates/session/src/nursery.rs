@@ -21,7 +21,7 @@ use dlsys_geometry::scene::{Bounds, Plant, Scene, Seedling, Width};
 use dlsys_geometry::turtle::{self, Strains};
 use dlsys_model::{self as model, Model};
 use dlsys_sim::{self as sim, Settings, Simulation, brief};
-use dlsys_surround::{self as surround, Classes, Motion, Passive as Following, Place, Weather};
+use dlsys_surround::{self as surround, Classes, Gases, Motion, Passive as Following, Place, Weather};
 use dlsys_tree::ModuleString;
 
 /// Most simulations that are kept from one scene to the next.
@@ -97,12 +97,14 @@ pub struct Nursery<'m> {
     gauge: OnceLock<Option<Gauge>>,
     /// Threads for the plants of one scene.
     threads: usize,
+    has_gases: bool,
 }
 
 /// What is passive in a scene.
 struct Passive<'m> {
     around: Around<'m>,
     motion: Option<Motion<'m>>,
+    gases: Option<Gases<'m>>,
 }
 
 impl<'m> Nursery<'m> {
@@ -132,12 +134,18 @@ impl<'m> Nursery<'m> {
             detail: None,
             gauge: OnceLock::new(),
             threads: 1,
+            has_gases: true,
         }
     }
 
     /// With so many threads for the plants of one scene, at least 1. Results do not depend on it.
     pub fn with_threads(self, threads: usize) -> Nursery<'m> {
         Nursery { threads: threads.max(1), ..self }
+    }
+
+    /// Without blobs of gases, which then cost nothing.
+    pub fn without_gases(self) -> Nursery<'m> {
+        Nursery { has_gases: false, ..self }
     }
 
     /// For pictures of this size, in which plants that are small move by the modes of their class, with an error below its bound, and plants that
@@ -167,25 +175,36 @@ impl<'m> Nursery<'m> {
     /// # Errors
     /// A module that cannot be drawn, or a plant whose run or drawing fails.
     pub fn draw(&self, string: &ModuleString, scene: &mut Scene) -> Result<(), DrawError> {
-        let Passive { around, motion } = self.passive()?;
+        let Passive { around, motion, gases } = self.passive()?;
+        // They read the motion of stems at ticks before.
+        let gases = match gases {
+            Some(gases) => gases.at(string.time, motion.as_ref())?,
+            None => Vec::new(),
+        };
         let bent = match motion {
             Some(motion) => Some(motion.at(string)?),
             None => None,
         };
         let strains = bent.as_ref().map(|bent| bent as &dyn Strains);
-        self.draw_with((self.settings.seed, around), string, strains, scene)
+        self.draw_with((self.settings.seed, around), string, strains, scene)?;
+        scene.gases = gases;
+        Ok(())
     }
 
     /// What is passive in the scene.
     fn passive(&self) -> Result<&Passive<'m>, surround::Error> {
         let start = || {
             let model = self.model;
-            let sways = sways(model);
-            let weather = if sways { Weather::of(model, self.settings)? } else { None };
+            let has_gas = self.has_gases && turtle::lets_out(model);
+            let weather = if sways(model) || has_gas { Weather::of(model, self.settings)? } else { None };
             let around = Around { place: Place::of_scene(&model.scenery), weather: weather.clone() };
             let following = Following::of(self.settings.bending);
-            let motion = Motion::new(model, self.settings, weather, around.place, following)?;
-            Ok(Passive { around, motion })
+            let motion = Motion::new(model, self.settings, weather.clone(), around.place, following)?;
+            let gases = match has_gas {
+                true => Gases::new(model, self.settings, weather, self.threads)?,
+                false => None,
+            };
+            Ok(Passive { around, motion, gases })
         };
         self.passive.get_or_init(start).as_ref().map_err(Clone::clone)
     }

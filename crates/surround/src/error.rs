@@ -2,6 +2,7 @@
 
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_fall as fall;
+use dlsys_gas as gas;
 use dlsys_geometry::turtle;
 use dlsys_model::Model;
 use dlsys_sim::{self as sim, brief};
@@ -127,6 +128,18 @@ pub enum Error {
         /// The name in the declaration of the first one beyond.
         span: Span,
     },
+    /// A gas cannot be followed.
+    #[error("the gas `{name}` cannot be followed at t = {}: {error}", brief(*.time, 8))]
+    Gas {
+        /// Its name.
+        name: String,
+        /// The reason.
+        error: gas::Error,
+        /// The time in units of the model.
+        time: f64,
+        /// The strongest source, or the declaration.
+        span: Span,
+    },
     /// Too many parts are let go.
     #[error("more than {most} parts are let go up to t = {time}")]
     TooManyParts {
@@ -144,7 +157,7 @@ pub enum Error {
         limit: f64,
         /// The time in units of the model.
         time: f64,
-        /// The declaration of the first tissue, the first `@D`, or the first body.
+        /// The declaration of the first tissue, the first `@D`, the first body, or the first `@S`.
         span: Span,
     },
     /// Too many steps up to the time that is asked for.
@@ -244,6 +257,20 @@ impl Error {
                     .at(*span, "of this name is the first one beyond")
                     .help("draw several bodies in one module, or name fewer modules")
             }
+            Error::Gas { name, error: gas::Error::Blobs { most, .. }, time, span } => Diagnostic::error(format!(
+                "the gas `{name}` has more than {most} blobs at t = {}",
+                brief(*time, 8)
+            ))
+            .at(*span, "they begin here")
+            .note("a source makes `rate` blobs in a unit of t, and each lasts until a thousandth of its mass is left: 6.9/decay seconds")
+            .help("let fewer of a greater `mass` begin: a cloud looks the same, and `size` keeps it smooth")
+            .help("`decay` ends them sooner"),
+            Error::Gas { error, span, .. } => Diagnostic::error(self.to_string())
+                .at(*span, match error {
+                    gas::Error::Wind { .. } => "it begins here",
+                    _ => "declared here",
+                })
+                .help("look at its values in `units`, and at the speed of the wind"),
             Error::TooManyParts { most, span, .. } => {
                 let diagnostic = Diagnostic::error(self.to_string());
                 let diagnostic = match span {

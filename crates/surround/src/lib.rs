@@ -1,4 +1,4 @@
-//! The surroundings of a growing plant: wind, the stems that bend in it, and what is let go and falls.
+//! The surroundings of a growing plant: wind, the stems that bend in it, what is let go and falls, and gases.
 //!
 //! ```text
 //! growth (sim) ──string──▶ turtle ──skeleton──▶ body ──▶ stems in the wind (sway, wind) ──strains──▶ turtle ──▶ scene
@@ -12,6 +12,7 @@
 //! - [`Weather`]: the wind that a model declares.
 //! - [`Survey`]: axes of a string with their natural frequencies, before anything is simulated.
 //! - [`Classes`]: modes by which plants move that are small in the picture.
+//! - [`Gases`]: smoke, steam and pollen at any time.
 //! - [`Loose`]: what is let go, as a body.
 //! - [`Motion`]: the stems and the flights of a model at any time, as [`BentStems`] for [`draw_bent`](dlsys_geometry::turtle::draw_bent).
 
@@ -23,10 +24,13 @@ mod classes;
 mod coupled;
 mod course;
 mod descent;
+mod drift;
 mod error;
 mod flights;
+mod gases;
 mod loose;
 mod motion;
+mod outlets;
 mod place;
 mod points;
 mod solids;
@@ -37,6 +41,7 @@ pub use bending::{BentStems, Effort};
 pub use classes::{ByModes, Classes};
 pub use coupled::start;
 pub use error::{Error, FailedStem, FallingPart};
+pub use gases::{Gases, MOST_BLOBS, TICK as GAS_TICK};
 pub use loose::Loose;
 pub use motion::{MOST_TICKS, Motion, Passive};
 pub use place::Place;

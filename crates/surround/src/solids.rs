@@ -95,6 +95,12 @@ impl<'m> Solids<'m> {
     /// # Errors
     /// The growth up to that time fails or takes too long, or a body cannot be one.
     pub(crate) fn at(&self, seconds: f64) -> Result<Vec<Arc<dyn Obstacle>>, Error> {
+        let hulls = self.hulls(seconds)?.into_iter();
+        Ok(hulls.map(|hull| Arc::new(hull) as Arc<dyn Obstacle>).collect())
+    }
+
+    /// The same as hulls.
+    pub(crate) fn hulls(&self, seconds: f64) -> Result<Vec<Hull>, Error> {
         let place = (seconds / CLOCK * PARTS).max(0.0);
         if place > MOST_TICKS * PARTS {
             let Units { time: second, .. } = self.place.units;
@@ -122,8 +128,7 @@ impl<'m> Solids<'m> {
                 ends[before].get_or_insert(body);
             }
         }
-        let hulls = here.iter().zip(ends).filter_map(|(body, end)| body.hull(end, part));
-        Ok(hulls.map(|hull| Arc::new(hull) as Arc<dyn Obstacle>).collect())
+        Ok(here.iter().zip(ends).filter_map(|(body, end)| body.hull(end, part)).collect())
     }
 
     /// The first name in the declaration.

@@ -8,7 +8,9 @@ use dlsys_expr::Program;
 use dlsys_model::{self as model, Model, Primitive, Scenery, Units};
 use dlsys_sim::Settings;
 use dlsys_sway as sway;
-use dlsys_wind::{self as wind, Description, Field, Flow, Ground, Signal, Snapshot, Spectrum};
+use dlsys_wind::{
+    self as wind, Description, Field, Flow, Ground, Hull, Obstacle, Signal, Snapshot, Spectrum,
+};
 use nalgebra::Vector3;
 
 use crate::solids::Solids;
@@ -17,7 +19,7 @@ use crate::{Error, Place};
 /// The wind of a scene, with its bodies: a pure function of place and time.
 pub struct Weather<'m> {
     declared: Arc<Declared>,
-    solids: Option<Solids<'m>>,
+    solids: Option<Arc<Solids<'m>>>,
     /// The last instants with bodies.
     recent: Recent,
 }
@@ -36,6 +38,9 @@ struct Recent(Mutex<VecDeque<(f64, Arc<Snapshot>)>>);
 
 /// Number of instants that are kept: the stages of some ticks, as plants that are drawn one after another read them.
 const KEPT: usize = 48;
+
+/// A cloud that is smaller than this part of the smallest eddies feels all of them: 99.8 % of their velocity.
+const NOTHING: f64 = 0.01;
 
 impl Recent {
     /// An instant that is kept, or a new one.
@@ -76,23 +81,27 @@ impl Spans {
 impl Declared {
     /// The wind and the flows that a model declares; `None` if it declares neither, and no bodies that may move the air.
     fn of(scenery: &Scenery) -> Result<Option<Arc<Declared>>, Error> {
-        let Scenery { units, wind, flows, ground, solids, .. } = scenery;
+        let Scenery { wind, flows, solids, .. } = scenery;
         let span = wind.as_ref().map(|wind| wind.span).or(flows.first().map(|flow| flow.span));
         let Some(span) = span.or(solids.first().map(|(_, span)| *span)) else { return Ok(None) };
-        let make = || {
-            let mut description = match wind {
-                Some(wind) => of_wind(wind, *units),
-                None => Description::new(Vector3::x(), 0.0),
-            };
-            description.flows = flows.iter().map(|flow| of_flow(flow, *units)).collect();
-            description.ground = ground.map(|height| Ground::Flat(height * units.length));
-            let spans = Spans { wind: span, flows: flows.iter().map(|flow| flow.span).collect() };
-            match Field::new(description) {
-                Ok(field) => Ok(Arc::new(Declared { field, recent: Recent::default(), spans })),
-                Err(error) => Err(spans.locate(error)),
-            }
+        scenery.field.get_or_make(|| Declared::new(scenery, span, 0.0))
+    }
+
+    /// With turbulence averaged over a Gaussian of a standard deviation in m.
+    fn new(scenery: &Scenery, span: Span, smoothing: f64) -> Result<Arc<Declared>, Error> {
+        let Scenery { units, wind, flows, ground, .. } = scenery;
+        let mut description = match wind {
+            Some(wind) => of_wind(wind, *units),
+            None => Description::new(Vector3::x(), 0.0),
         };
-        scenery.field.get_or_make(make)
+        description.smoothing = smoothing;
+        description.flows = flows.iter().map(|flow| of_flow(flow, *units)).collect();
+        description.ground = ground.map(|height| Ground::Flat(height * units.length));
+        let spans = Spans { wind: span, flows: flows.iter().map(|flow| flow.span).collect() };
+        match Field::new(description) {
+            Ok(field) => Ok(Arc::new(Declared { field, recent: Recent::default(), spans })),
+            Err(error) => Err(spans.locate(error)),
+        }
     }
 
     fn at(&self, time: f64) -> Result<Arc<Snapshot>, Error> {
@@ -109,7 +118,7 @@ impl<'m> Weather<'m> {
     /// A value that is out of range, with the place of its declaration; bodies of a model whose rules read `strain`.
     pub fn of(model: &'m Model, settings: Settings) -> Result<Option<Arc<Weather<'m>>>, Error> {
         let Some(declared) = Declared::of(&model.scenery)? else { return Ok(None) };
-        let solids = Solids::new(model, settings)?;
+        let solids = Solids::new(model, settings)?.map(Arc::new);
         Ok(Some(Arc::new(Weather { declared, solids, recent: Recent::default() })))
     }
 
@@ -123,9 +132,51 @@ impl<'m> Weather<'m> {
         Ok(declared.map(weather))
     }
 
+    /// The same wind as a cloud of a size feels it, around the same bodies: turbulence averaged over a Gaussian of this standard deviation in m.
+    ///
+    /// # Errors
+    /// A value that is out of range.
+    pub(crate) fn averaged(&self, scenery: &Scenery, size: f64) -> Result<Weather<'m>, Error> {
+        let declared = match self.field().smallest_eddy() {
+            Some(eddy) if size > NOTHING * eddy => Declared::new(scenery, self.declared.spans.wind, size)?,
+            _ => Arc::clone(&self.declared),
+        };
+        Ok(Weather { declared, solids: self.solids.clone(), recent: Recent::default() })
+    }
+
     /// The field without bodies.
     pub fn field(&self) -> &Field {
         &self.declared.field
+    }
+
+    /// The wind at an instant, in s, without bodies.
+    ///
+    /// # Errors
+    /// A value of the wind that is not finite at that time.
+    pub(crate) fn free(&self, time: f64) -> Result<Arc<Snapshot>, Error> {
+        self.declared.at(time)
+    }
+
+    /// The bodies at a time in s.
+    ///
+    /// # Errors
+    /// Their growth up to that time fails.
+    pub(crate) fn hulls(&self, time: f64) -> Result<Vec<Hull>, Error> {
+        self.solids.as_ref().map_or(Ok(Vec::new()), |solids| solids.hulls(time))
+    }
+
+    /// True if there may be bodies.
+    pub(crate) fn has_bodies(&self) -> bool {
+        self.solids.is_some()
+    }
+
+    /// A wind with bodies in it as they are at an instant.
+    ///
+    /// # Errors
+    /// One of them cannot push the wind.
+    pub(crate) fn among(&self, free: &Snapshot, hulls: &[Hull]) -> Result<Snapshot, Error> {
+        let bodies: Vec<_> = hulls.iter().map(|hull| Arc::new(hull.clone()) as Arc<dyn Obstacle>).collect();
+        free.among(&bodies).map_err(|error| self.declared.spans.locate(error))
     }
 
     /// The wind at an instant, in s.

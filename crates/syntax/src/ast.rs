@@ -329,6 +329,15 @@ pub enum Item {
         /// Its values, in the order written.
         attributes: Vec<Attribute>,
     },
+    /// `gas name = size s, mass m, extinction x, …`: smoke, steam or pollen.
+    Gas {
+        /// The name that expressions read as the number of the gas.
+        name: Name,
+        /// Its values, in the order written.
+        attributes: Vec<Attribute>,
+        /// Its colours, as `#rrggbb` or `#rgb`: more than one is an error.
+        colors: Vec<Text>,
+    },
     /// `solid names`: the modules whose drawings are solid bodies.
     Solid(Vec<Name>),
     /// `ignore names`: the modules that context matching passes over.
@@ -376,6 +385,7 @@ impl Item {
             Item::Wind { .. } => "wind",
             Item::Flow { .. } => "flow",
             Item::Tissue { .. } => "tissue",
+            Item::Gas { .. } => "gas",
             Item::Solid(_) => "solid",
             Item::Ignore(_) => "ignore",
             Item::Consider(_) => "consider",
@@ -400,6 +410,7 @@ impl Item {
             | Item::Surface { name, .. }
             | Item::Plant { name, .. }
             | Item::Tissue { name, .. }
+            | Item::Gas { name, .. }
             | Item::Contour { name, .. } => Some(name),
             _ => None,
         }

@@ -73,7 +73,7 @@ const fn row(word: &'static str, rule: Rule) -> Declaration {
 }
 
 /// All declarations, in the order in which messages list them.
-pub static DECLARATIONS: [Declaration; 30] = [
+pub static DECLARATIONS: [Declaration; 31] = [
     Declaration {
         usage: "\"…\"",
         summary: "the title of the model, shown above its pictures",
@@ -321,6 +321,27 @@ pub static DECLARATIONS: [Declaration; 30] = [
         begins: Begins::BeforeValue,
         written: "a tissue is written `tissue stalk = stiffness 2e8, density 900, damping 0.05`",
         ..row("tissue", Rule::tissue_item)
+    },
+    Declaration {
+        usage: "NAME = diffusion K, decay A, size S, mass M, extinction X, albedo O, glow Q, fall V, color \"#rrggbb\"",
+        summary: "smoke, steam or pollen, used as `@S(NAME, rate, radius)`: m²/s, 1/s, m, kg, m²/kg, fall in m/s",
+        category: Category::Scene,
+        named: Named::Word,
+        repeats: Repeats::PerName("value"),
+        options: &[
+            option("diffusion", Follow::Value),
+            option("decay", Follow::Value),
+            option("size", Follow::Value),
+            option("mass", Follow::Value),
+            option("extinction", Follow::Value),
+            option("albedo", Follow::Value),
+            option("glow", Follow::Value),
+            option("fall", Follow::Value),
+            option("color", Follow::Text),
+        ],
+        begins: Begins::BeforeValue,
+        written: "a gas is written `gas steam = size 0.01, mass 1e-6, extinction 200, diffusion 1e-4, decay 0.5, fall -0.3`",
+        ..row("gas", Rule::gas_item)
     },
     Declaration {
         usage: "NAME …",

@@ -76,6 +76,11 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
         Rule::wind_item => Item::Wind { direction: parts.triple()?, attributes: parts.attributes()? },
         Rule::flow_item => Item::Flow { kind: parts.attribute()?, attributes: parts.attributes()? },
         Rule::tissue_item => Item::Tissue { name: parts.name(), attributes: parts.attributes()? },
+        Rule::gas_item => {
+            let name = parts.name();
+            let (attributes, colors) = parts.values_and_colors()?;
+            Item::Gas { name, attributes, colors }
+        }
         Rule::solid_item => Item::Solid(parts.names()),
         Rule::ignore_item => Item::Ignore(parts.names()),
         Rule::consider_item => Item::Consider(parts.names()),
@@ -166,6 +171,12 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
         Item::Tissue { name, attributes } => {
             format!("tissue {} = {}", name.text, written(expressions, attributes, ", "))
         }
+        Item::Gas { name, attributes, colors } => {
+            let values = attributes.iter().map(|one| attribute(expressions, one));
+            let all: Vec<String> =
+                values.chain(colors.iter().map(|color| format!("color \"{}\"", color.text))).collect();
+            format!("gas {} = {}", name.text, all.join(", "))
+        }
         Item::Solid(list) => format!("solid {}", print::names(list, " ")),
         Item::Ignore(list) => format!("ignore {}", print::names(list, " ")),
         Item::Consider(list) => format!("consider {}", print::names(list, " ")),
@@ -252,6 +263,21 @@ impl<'i> Parts<'_, '_, 'i> {
             all.push(self.attribute()?);
         }
         Ok(all)
+    }
+
+    /// Attributes with values, and the colours among them.
+    fn values_and_colors(&mut self) -> Built<(Vec<Attribute>, Vec<Text>)> {
+        let (mut attributes, mut colors) = (Vec::new(), Vec::new());
+        while let Some(next) = self.pairs.as_slice().first() {
+            match next.clone().into_inner().find(|pair| pair.as_rule() == Rule::text) {
+                Some(color) => {
+                    self.pair();
+                    colors.push(self.builder.text(&color));
+                }
+                None => attributes.push(self.attribute()?),
+            }
+        }
+        Ok((attributes, colors))
     }
 
     fn assignments(&mut self) -> Built<Vec<(Name, Expression)>> {

@@ -95,6 +95,9 @@ pub struct Description {
     pub period: Option<f64>,
     /// The seed of the turbulence.
     pub seed: u64,
+    /// Turbulence is averaged over a Gaussian of this standard deviation in metres, as a body or a cloud of that size feels it: the same eddies, of
+    /// which small ones are weaker. 0 leaves it as it is.
+    pub smoothing: f64,
     /// The energy spectrum of the turbulence.
     pub spectrum: Spectrum,
     /// Further parts of the large-scale wind, which are added up.
@@ -106,7 +109,7 @@ pub struct Description {
 }
 
 impl Description {
-    /// A wind of a direction and a speed in m/s, without turbulence, in empty space. The integral scale is 1 m, the seed 0.
+    /// A wind of a direction and a speed in m/s, without turbulence, in empty space. The integral scale is 1 m, the seed 0, and nothing is averaged.
     pub fn new(direction: Vector3<f64>, speed: impl Into<Signal>) -> Description {
         Description {
             direction,
@@ -116,6 +119,7 @@ impl Description {
             roughness: None,
             period: None,
             seed: 0,
+            smoothing: 0.0,
             spectrum: Spectrum::VonKarman,
             flows: Vec::new(),
             ground: None,
@@ -134,6 +138,7 @@ impl Description {
         }
         not_negative("the turbulence intensity", self.turbulence)?;
         positive("the integral scale of the turbulence", self.scale)?;
+        not_negative("the smoothing of the turbulence", self.smoothing)?;
         if let Some(roughness) = self.roughness
             && !(roughness > 0.0 && roughness < 10.0)
         {

@@ -83,11 +83,13 @@ impl Field {
             Spectrum::Kolmogorov { sigma, .. } => (Kind::Still(sigma), Vector3::zeros()),
         };
         let energy = Energy::new(d.spectrum, d.scale);
-        let bands =
-            if d.turbulence > 0.0 { bands(energy, travels, d.seed).into() } else { Vec::<Band>::new() };
+        let bands = match d.turbulence > 0.0 {
+            true => bands(energy, (travels, d.smoothing), d.seed).into(),
+            false => Vec::<Band>::new(),
+        };
         let mut layers = [0.0; BANDS];
         for (layer, band) in layers.iter_mut().zip(&bands) {
-            *layer = LAYER * band.eddy_size();
+            *layer = LAYER * band.eddy_size;
         }
         let obstacles = d.obstacles.into_iter().map(Arc::from).collect();
         let setting = Setting { ground: d.ground, obstacles, layers, layer: d.scale };

@@ -41,6 +41,34 @@ impl Hull {
         Some(Hull { points, radius, centre, reach, layer, velocity, spin })
     }
 
+    /// A ball around it: centre and radius.
+    pub fn ball(&self) -> (Vector3<f64>, f64) {
+        (self.centre, self.reach + self.radius)
+    }
+
+    /// The nearest place outside, for one inside; any other place itself. Of places deep inside it is the one on the way out from the centre.
+    pub fn outside(&self, place: Vector3<f64>) -> Vector3<f64> {
+        let is_in = |place| self.distance(place, 0.0) < 0.0;
+        if !is_in(place) {
+            return place;
+        }
+        // Beyond rounding.
+        let margin = 1e-9 * (self.reach + self.radius);
+        let way = Nearest::of(&self.points, place).way;
+        let distance = way.norm();
+        let near = place + way * ((self.radius - distance + margin) / distance);
+        if distance > 0.0 && !is_in(near) {
+            return near;
+        }
+        let away = (place - self.centre).try_normalize(0.0).unwrap_or_else(Vector3::y);
+        let (mut inner, mut outer) = (0.0, 2.0 * (self.reach + self.radius) + margin);
+        for _ in 0..50 {
+            let middle = 0.5 * (inner + outer);
+            if is_in(place + away * middle) { inner = middle } else { outer = middle }
+        }
+        place + away * outer
+    }
+
     /// The same body with the velocity of its centre in m/s and the velocity of its rotation in 1/s.
     pub fn moving(self, velocity: Vector3<f64>, spin: Vector3<f64>) -> Hull {
         Hull { velocity, spin, ..self }
@@ -261,6 +289,22 @@ mod tests {
             } else {
                 assert!(outside.norm() - 0.1 > body.layer() - 1e-12, "{place} {found}");
             }
+        }
+    }
+
+    #[test]
+    fn the_way_out_of_a_cube_is_the_nearest_one_near_its_surface() {
+        let body = Hull::new(cube(), 0.1).unwrap();
+        for place in places() {
+            let out = body.outside(place);
+            let distance = body.distance(place, 0.0);
+            if distance >= 0.0 {
+                assert_eq!(out, place);
+                continue;
+            }
+            assert!(body.distance(out, 0.0) >= 0.0 && body.distance(out, 0.0) < 1e-6, "{place}");
+            let is_near = distance > -0.1 + 1e-9;
+            assert!(!is_near || ((out - place).norm() + distance).abs() < 1e-6, "{place} {out}");
         }
     }
 

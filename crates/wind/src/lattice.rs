@@ -235,7 +235,7 @@ mod tests {
     use crate::turns::cos_sin;
 
     fn first_band() -> (Band, Lattice, Instant) {
-        let [band, ..] = bands(Energy::new(Spectrum::VonKarman, 3.0), Vector3::x(), 1);
+        let [band, ..] = bands(Energy::new(Spectrum::VonKarman, 3.0), (Vector3::x(), 0.0), 1);
         let at = Instant { share: 0.0, drift: 3.5, swept: 0.7 };
         let lattice = Lattice::new(&band, at, None, 1.0, &mut Transform::new());
         (band, lattice, at)
@@ -248,7 +248,7 @@ mod tests {
         let lap = Some(Lap { drift: 40.0, swept: 12.0 });
         let late = Instant { share: 0.0, drift: 4e6, swept: 1.3e6 };
         let within = Instant { share: 0.37, drift: 0.25, swept: -0.5 };
-        for (i, band) in bands(energy, Vector3::x(), 1).iter().enumerate() {
+        for (i, band) in bands(energy, (Vector3::x(), 0.0), 1).iter().enumerate() {
             for (at, lap, tolerance) in [(late, None, 3e-9), (within, lap, 3e-14), (within, None, 3e-14)] {
                 let lattice = Lattice::new(band, at, lap, 1.0, &mut Transform::new());
                 let (mut error, mut square) = (0.0, 0.0);
@@ -277,7 +277,7 @@ mod tests {
     fn velocities_are_curls_of_the_spline_through_the_modes() {
         let energy = Energy::new(Spectrum::VonKarman, 3.0);
         let at = Instant { share: 0.0, drift: 130.0, swept: 40.0 };
-        for (i, band) in bands(energy, Vector3::x(), 1).iter().enumerate() {
+        for (i, band) in bands(energy, (Vector3::x(), 0.0), 1).iter().enumerate() {
             let lattice = Lattice::new(band, at, None, 1.0, &mut Transform::new());
             let (mut error, mut square) = (0.0, 0.0);
             for n in 0..40 {

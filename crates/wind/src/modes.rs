@@ -75,18 +75,28 @@ pub(crate) struct Band {
     /// The wave numbers between which its modes lie; 0 for the lower end of the first.
     pub(crate) range: [f64; 2],
     pub(crate) modes: Vec<Mode>,
+    /// The size of the eddies in metres, without smoothing: the root of the mean of 1/k², weighted by the energy.
+    pub(crate) eddy_size: f64,
     /// The modes again, with their frequencies and amplitudes.
     pub(crate) groups: Vec<Group>,
 }
 
-/// The bands of a spectrum. `direction` is that of the wind, by which eddies travel; zero if they stay.
-pub(crate) fn bands(energy: Energy, direction: Vector3<f64>, seed: u64) -> [Band; BANDS] {
+/// The bands of a spectrum. `direction` is that of the wind, by which eddies travel; zero if they stay. They are averaged over a Gaussian whose standard
+/// deviation in metres is given.
+pub(crate) fn bands(energy: Energy, (direction, smoothing): (Vector3<f64>, f64), seed: u64) -> [Band; BANDS] {
     let quantiles = Quantiles::new();
-    std::array::from_fn(|i| Band::new(i, energy, direction, Draw::new(seed).of(i as u64), &quantiles))
+    let around = (direction, smoothing);
+    std::array::from_fn(|i| Band::new(i, energy, around, Draw::new(seed).of(i as u64), &quantiles))
 }
 
 impl Band {
-    fn new(i: usize, energy: Energy, direction: Vector3<f64>, draw: Draw, quantiles: &Quantiles) -> Band {
+    fn new(
+        i: usize,
+        energy: Energy,
+        (direction, smoothing): (Vector3<f64>, f64),
+        draw: Draw,
+        quantiles: &Quantiles,
+    ) -> Band {
         let scaled = |times: usize| (0..times).fold(energy.smallest(), |unit, _| unit * RATIO);
         let unit = scaled(i);
         let end = CUT * unit;
@@ -115,22 +125,20 @@ impl Band {
         for mode in &mut modes {
             mode.power *= scale;
         }
+        let eddy_size = eddy_size(&modes);
+        // The mean of a wave over the Gaussian is exp(-k²s²/2) of it.
+        for mode in &mut modes {
+            mode.power *= libm::exp(-(mode.k * smoothing).powi(2));
+        }
         let period = TAU / unit;
         let members: Vec<Member> =
             modes.iter().map(|mode| mode.member(unit, heading, period / N as f64, draw, quantiles)).collect();
-        Band { period, rotation, range: [lowest, end], modes, groups: Group::of(&members) }
+        Band { period, rotation, range: [lowest, end], modes, eddy_size, groups: Group::of(&members) }
     }
 
     /// The expected variance of each component of the velocity.
     pub(crate) fn variance(&self) -> f64 {
         self.modes.iter().map(|mode| 4.0 * mode.power).sum::<f64>() / 3.0
-    }
-
-    /// The size of the eddies in metres: the root of the mean of 1/k², weighted by the energy.
-    pub(crate) fn eddy_size(&self) -> f64 {
-        let sum = |f: fn(&Mode) -> f64| self.modes.iter().map(f).sum::<f64>();
-        let total = sum(|mode| mode.power);
-        if total > 0.0 { (sum(|mode| mode.power / (mode.k * mode.k)) / total).sqrt() } else { 0.0 }
     }
 
     /// The complex amplitude of the velocity of each mode at an instant, in the axes of the lattice: real and imaginary part of the
@@ -148,6 +156,13 @@ impl Band {
             each(mode, p * sum[0] + q * sum[2], p * sum[1] + q * sum[3]);
         }
     }
+}
+
+/// The root of the mean of 1/k², weighted by the energy.
+fn eddy_size(modes: &[Mode]) -> f64 {
+    let sum = |f: fn(&Mode) -> f64| modes.iter().map(f).sum::<f64>();
+    let total = sum(|mode| mode.power);
+    if total > 0.0 { (sum(|mode| mode.power / (mode.k * mode.k)) / total).sqrt() } else { 0.0 }
 }
 
 impl Mode {
@@ -231,7 +246,7 @@ mod tests {
     #[test]
     fn sums_of_modes_are_the_integrals_of_their_bands() {
         let energy = Energy::new(Spectrum::VonKarman, 3.0);
-        let bands = bands(energy, Vector3::x(), 1);
+        let bands = bands(energy, (Vector3::x(), 0.0), 1);
         let mut end = 0.0;
         for band in &bands {
             assert_eq!(band.range[0], end, "bands meet");
@@ -249,7 +264,7 @@ mod tests {
 
     #[test]
     fn no_period_of_a_lattice_lies_in_a_plane_of_the_world() {
-        let bands = bands(Energy::new(Spectrum::VonKarman, 3.0), Vector3::x(), 1);
+        let bands = bands(Energy::new(Spectrum::VonKarman, 3.0), (Vector3::x(), 0.0), 1);
         for band in &bands {
             for n in half_space().filter(|n| n.iter().map(|n| n * n).sum::<i32>() <= 12) {
                 let period = band.rotation.inverse() * Vector3::from(n.map(f64::from));

@@ -273,3 +273,37 @@ fn instants_without_a_wind_are_errors() {
     // A place that is not finite has no velocity, and nothing panics.
     assert!(field.at(0.0).unwrap().velocity(Vector3::new(f64::NAN, 0.0, f64::INFINITY)).x.is_nan());
 }
+
+/// The mean of a wave over a Gaussian of deviation s is exp(-k²s²/2) of it; nothing else changes. The interpolated field follows its modes.
+#[test]
+fn smoothing_weakens_each_wave_as_the_mean_over_a_gaussian() {
+    let deviation = 0.3;
+    let plain = Field::new(gusty()).unwrap();
+    let smooth = Field::new(Description { smoothing: deviation, ..gusty() }).unwrap();
+    let modes = |field: &Field| {
+        let mut modes = Vec::new();
+        field.modes(2.7, |band, k, amplitude| modes.push((band, k, amplitude))).unwrap();
+        modes
+    };
+    let (before, after) = (modes(&plain), modes(&smooth));
+    assert!(before.len() == after.len() && before.len() > 5000);
+    for ((band, k, from), (other, wave, to)) in before.iter().zip(&after) {
+        assert_eq!((band, k), (other, wave));
+        let factor = (-k.norm_squared() * deviation * deviation / 2.0).exp();
+        for part in [0, 1] {
+            assert!((from[part] * factor - to[part]).norm() <= 1e-12 * from[part].norm());
+        }
+    }
+    assert!(smooth.variance(2.7).unwrap() < 0.95 * plain.variance(2.7).unwrap());
+    let snapshot = smooth.at(2.7).unwrap();
+    let (mut error, mut square) = (0.0, 0.0);
+    let mean =
+        Vector3::new(1.0, 0.0, 0.2).normalize() * (5.0 + 2.0 * (0.25 * std::f64::consts::PI * 2.7).sin());
+    for place in places().into_iter().step_by(5) {
+        let exact = smooth.sum_of_modes(2.7, place).unwrap();
+        error += (snapshot.velocity(place) - mean - exact).norm_squared();
+        square += exact.norm_squared();
+    }
+    assert!((error / square).sqrt() < 0.05, "{}", (error / square).sqrt());
+    assert!(Field::new(Description { smoothing: -1.0, ..gusty() }).is_err());
+}

@@ -37,6 +37,7 @@
 mod bending;
 mod curves;
 mod falling;
+mod gas;
 mod given;
 mod plan;
 mod scene;

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::bending::BendingPlan;
 use super::curves::CurvePlan;
 use super::falling::FallingPlan;
+use super::gas;
 use super::scene::{self, ScenePart};
 use super::{given, words};
 use crate::diagnostic::Source;
@@ -188,6 +189,7 @@ impl Explanation {
         scene.extend(bending.iter().chain(&bending_of_plants).map(|bending| bending.part.clone()));
         let falling = FallingPlan::all(model);
         scene.extend(falling.iter().map(|falling| falling.row.clone()));
+        scene.extend(gas::parts(model));
         Explanation {
             model: session.source.name.clone(),
             title: model.title.clone(),

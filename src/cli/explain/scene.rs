@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::model::{Flow, Model, Primitive, Scenery, Spectrum, Tissue, Units, Wind};
 use crate::session::sways;
 use crate::sim::brief;
+use crate::turtle;
 
 /// A part of a scene that is declared.
 #[derive(Clone, Serialize)]
@@ -75,10 +76,10 @@ fn solid(model: &Model) -> Option<ScenePart> {
         model.scenery.solids.iter().map(|(kind, _)| &*model.kinds.get(*kind).name).collect();
     names.dedup();
     let part = format!("solid {}", names.join(" "));
-    match (names.is_empty(), sways(model)) {
+    match (names.is_empty(), sways(model) || turtle::lets_out(model)) {
         (true, _) => None,
         (_, false) => {
-            let why = "nothing in the scene feels the wind: no stem gives way, and nothing is let go";
+            let why = "nothing in the scene feels the wind: no stem gives way, nothing is let go, and there is no gas";
             Some(ScenePart::new(part, "nothing to do", why))
         }
         (_, true) => {

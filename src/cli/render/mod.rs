@@ -61,6 +61,9 @@ fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Fail
 
 /// Renders specimens with several seeds, to one scale. All are measured before anything is written.
 fn specimens(args: &RenderArgs, format: Format, mut run: ModelRun, seeds: Seeds) -> Result<(), Failure> {
+    if format.content() == Content::Vectors {
+        run.note_missing_gases("an SVG picture");
+    }
     let begun = Instant::now();
     turntable::repeat(args, &mut run.times);
     let never = || false;
@@ -120,6 +123,9 @@ pub fn render_run(
     };
     let survey = flags::survey(args)?;
     flags::agree(args, format)?;
+    if format.content() == Content::Vectors {
+        run.note_missing_gases("an SVG picture");
+    }
     turntable::repeat(args, &mut run.times);
     let mut clock = run.clock;
     let threads = flags::threads(args);

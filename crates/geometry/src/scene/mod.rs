@@ -8,6 +8,7 @@
 //! - [`Segment`]: a straight piece of a stem. Segments that continue one another form tubes.
 //! - [`Polygon`]: a filled outline. [`Surface`]: a [`Mesh`] placed in space; many share one mesh.
 //! - [`Patch`]: a bicubic Bézier patch. [`PatchSet`]: a surface of patches, or a ball. [`Scene::tessellated`] makes meshes of them.
+//! - [`Gas`]: smoke, steam or pollen as blobs. [`GasSource`]: where they begin.
 //! - [`Owner`]: the module that drew an element. Its name is the same in every frame.
 //! - [`Plant`]: the scene of another model, placed in this one. [`Surroundings`]: light, sky, camera and floor.
 //! - [`Bounds`]: the bounds of a scene, or of all scenes of an animation.
@@ -20,6 +21,7 @@ mod bounds;
 mod degrees;
 mod element;
 mod flat;
+mod gas;
 mod material;
 mod mesh;
 mod patch;
@@ -30,6 +32,7 @@ pub use bounds::Bounds;
 pub use degrees::sin_cos_degrees;
 pub use dlsys_model::{Drawn, Footprint, Picture, Texture};
 pub use element::{Placement, Polygon, Segment, Surface, Width};
+pub use gas::{Blob, Gas, GasSource, SourceKey};
 pub use material::{Color, GRADIENT_STEPS, Material, MaterialId, Palette};
 pub use mesh::{Face, Mesh};
 pub use patch::{Net, Patch, PatchFace, PatchSet};
@@ -134,6 +137,10 @@ pub struct Scene {
     pub surfaces: Vec<Surface>,
     /// Bézier patches drawn by `@PD`, in string order.
     pub patches: Vec<Patch>,
+    /// Where blobs of gases begin, in string order.
+    pub sources: Vec<GasSource>,
+    /// The gases of the model with their blobs, in the order of their declarations; empty if they are not followed.
+    pub gases: Vec<Gas>,
     /// Plants of other models that are to be drawn, in string order; empty once they are among `plants`.
     pub seedlings: Vec<Seedling>,
     /// Plants of other models, in string order.
@@ -173,6 +180,8 @@ impl Scene {
         self.polygons.clear();
         self.surfaces.clear();
         self.patches.clear();
+        self.sources.clear();
+        self.gases.clear();
         self.seedlings.clear();
         self.plants.clear();
         self.surroundings = Surroundings::default();
@@ -204,7 +213,8 @@ impl Scene {
             + vertices * size_of::<Point>()
             + size_of_val(&*self.surfaces)
             + size_of_val(&*self.patches)
-            + size_of_val(&*self.plants);
+            + size_of_val(&*self.plants)
+            + self.gases.iter().map(|gas| size_of_val(&*gas.blobs)).sum::<usize>();
         let looks = self.plants.iter().map(|plant| &plant.scene);
         let others = looks.map(|scene| match known.insert(Arc::as_ptr(scene)) {
             true => size_of::<Scene>() + scene.footprint_beside(known),
@@ -219,6 +229,7 @@ impl Scene {
             && self.polygons.is_empty()
             && self.surfaces.is_empty()
             && self.patches.is_empty()
+            && self.gases.iter().all(|gas| gas.blobs.is_empty())
             && self.plants.iter().all(|plant| plant.scene.is_empty())
     }
 
@@ -302,6 +313,9 @@ impl Scene {
             if !reach.covers(patch.net.iter().flatten().copied()) {
                 patch.hull().for_each(|point| reach.include(point, Width::Set(0.0)));
             }
+        }
+        for (centre, radius) in self.gases.iter().flat_map(Gas::seen) {
+            reach.include(centre, Width::Set(2.0 * radius));
         }
         // The box around a plant: exact enough to frame a picture, at a cost that does not depend on the plant.
         for corner in self.plants.iter().flat_map(Plant::corners) {

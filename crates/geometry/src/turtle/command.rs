@@ -1,7 +1,7 @@
 //! Which module is which command.
 
 use super::frame::Axis;
-use dlsys_model::{DETACH, Kind, KindId, Model};
+use dlsys_model::{DETACH, Kind, KindId, Model, SOURCE};
 
 /// What a module tells the turtle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,6 +56,8 @@ pub(super) enum Command {
     Surface(usize),
     /// A plant of another model, by its index among those that the model declares.
     Plant(usize),
+    /// `@S(n, rate, radius)`: blobs of gas `n` begin here.
+    Source,
     /// `@D`: what follows is free.
     Detach,
     /// `@G`: the turtle is set on the ground.
@@ -115,6 +117,7 @@ impl Command {
             "@T" => Command::Bend,
             "@C" => Command::Contour,
             "@E" => Command::Elastic,
+            SOURCE => Command::Source,
             DETACH => Command::Detach,
             "@G" => Command::Ground,
             "@PS" => Command::BeginPatch,
@@ -129,24 +132,24 @@ impl Command {
         model.kinds.iter().map(|(_, kind)| Command::of(kind, model)).collect()
     }
 
-    /// The kinds of a model that hold an `@D`, themselves or in what they are drawn as, by the kinds' index.
-    pub(super) fn that_let_go(model: &Model) -> Vec<bool> {
+    /// The kinds of a model that hold a command, themselves or in what they are drawn as, by the kinds' index.
+    pub(super) fn that_hold(sought: Command, model: &Model) -> Vec<bool> {
         let table = Command::table(model);
-        let mut lets_go: Vec<bool> = table.iter().map(|command| *command == Command::Detach).collect();
-        let holds = |lets_go: &[bool], drawn: KindId| {
+        let mut holders: Vec<bool> = table.iter().map(|command| *command == sought).collect();
+        let holds = |holders: &[bool], drawn: KindId| {
             // Inside its own drawing a module is what its name says.
-            lets_go[drawn.index()] || Command::plain(model.kinds.get(drawn), model) == Command::Detach
+            holders[drawn.index()] || Command::plain(model.kinds.get(drawn), model) == sought
         };
         loop {
-            let before = lets_go.clone();
+            let before = holders.clone();
             for (id, command) in table.iter().enumerate() {
                 if let Command::Interpret(index) = command {
-                    lets_go[id] |=
+                    holders[id] |=
                         model.interpretations[*index].drawn.kinds().any(|kind| holds(&before, kind));
                 }
             }
-            if lets_go == before {
-                return lets_go;
+            if holders == before {
+                return holders;
             }
         }
     }
@@ -160,6 +163,7 @@ impl Command {
     pub(super) fn parameters(self) -> usize {
         match self {
             Command::ControlPoint
+            | Command::Source
             | Command::Leaf
             | Command::Flower
             | Command::Petal

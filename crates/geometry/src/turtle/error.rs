@@ -162,6 +162,9 @@ pub(super) enum Remark {
     GradientWithoutPlace(usize),
     NoContour(f64, usize),
     NoTissue(f64, usize),
+    NoGas(f64, usize),
+    /// A rate of a source below 0.
+    NegativeRate(f64),
     /// An `@D` of a part that was not there when its module was born.
     HeldBack,
     /// A polygon with so many vertices.
@@ -250,6 +253,19 @@ fn warning(remark: Remark, model: &Model, span: Option<Span>, time: f64) -> Diag
                 [] => "declare one and write its name: `tissue stalk = stiffness 2e8, density 900, damping 0.05`, `@E(stalk)`".to_owned(),
                 [first, ..] => format!("write the name of a tissue, such as `@E({})`; the model has {count}, and 0 is rigid", first.name),
             },
+        ),
+        Remark::NoGas(number, count) => (
+            "there is no such gas".to_owned(),
+            format!("gas {} at t = {time}; nothing begins here", short(number)),
+            match &model.scenery.gases[..] {
+                [] => "declare one and write its name: `gas steam = size 0.01, mass 1e-6, extinction 200`, `@S(steam, 100)`".to_owned(),
+                [first, ..] => format!("write the name of a gas, such as `@S({}, 100)`; the model has {count}", first.name),
+            },
+        ),
+        Remark::NegativeRate(rate) => (
+            "a gas begins at a rate below 0".to_owned(),
+            format!("{} at t = {time}; nothing begins here", short(rate)),
+            "the rate is a number of blobs in a unit of t, 0 or greater".to_owned(),
         ),
         Remark::HeldBack => (
             "this `@D` lets nothing go".to_owned(),

@@ -20,6 +20,7 @@
 //! | `@T(e)` | strength of the tropism from here on, in radians per scene unit: headings bend towards its direction (down, if the model declares none), see `bend.rs` |
 //! | `@C(n)` | cross-section of stems from here on: a contour that the model declares, 0 being a circle. Meshes only |
 //! | `@E(n)` | stems from here on give way, made of tissue `n` of the model, and are clamped here or at the stem below; 0 is rigid |
+//! | `@S(n, r, d)` | blobs of gas `n` of the model begin here, `r` of them in a unit of `t`, within the distance `d` (0) |
 //! | `[` `]` | remember and return to position, orientation, width, colour, cross-section, tissue and strength of tropism |
 //! | `{` `.` `}` | begin a filled polygon, make the position a vertex, end it; steps between them make vertices, too, and are not drawn |
 //! | `@L(s)` `@K(s)` `@P(s)` `@B(s)` | a leaf, a flower, a petal, a bud of size `s` (1), or any surface that the model declares; nothing if `s` is not positive |
@@ -75,7 +76,7 @@ use crate::scene::{Point, Scene, Vector};
 pub use bent::{PartKey, StemKey, Strains};
 use command::Command;
 use dlsys_diagnostic::Span;
-use dlsys_model::{DETACH, KindId, Model};
+use dlsys_model::{DETACH, KindId, Model, SOURCE};
 use dlsys_tree::ModuleString;
 pub use error::{Error, ErrorKind};
 pub use free::{FreePart, Passive, SolidBody};
@@ -186,7 +187,7 @@ pub fn solids(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result
 
 /// The kinds of a model that hold an `@D`, themselves or in what they are drawn as, by [`KindId::index`].
 pub fn kinds_that_let_go(model: &Model) -> Vec<bool> {
-    Command::that_let_go(model)
+    Command::that_hold(Command::Detach, model)
 }
 
 /// True if a model may let go of something (`@D`).
@@ -194,12 +195,27 @@ pub fn lets_go(model: &Model) -> bool {
     kinds_that_let_go(model).contains(&true)
 }
 
+/// True if a model may let out a gas (`@S`).
+pub fn lets_out(model: &Model) -> bool {
+    !model.scenery.gases.is_empty() && Command::that_hold(Command::Source, model).contains(&true)
+}
+
 /// The first place in the text of a model that writes an `@D`.
 pub fn place_of_detach(model: &Model) -> Option<Span> {
+    place_of(model, DETACH)
+}
+
+/// The first place in the text of a model that writes an `@S`.
+pub fn place_of_source(model: &Model) -> Option<Span> {
+    place_of(model, SOURCE)
+}
+
+/// The first place in the text of a model that writes a module with this base name.
+fn place_of(model: &Model, base: &str) -> Option<Span> {
     let of_rules = model.rules.iter().flat_map(|rule| &rule.produces).flat_map(|p| &p.outcome.successors);
     let drawings = model.interpretations.iter().map(|interpretation| &interpretation.drawn);
     let strings = std::iter::once(&model.axiom).chain(of_rules).chain(drawings);
     let places = strings.flat_map(|string| string.stretches()).flat_map(|stretch| &stretch.places);
-    let is_one = |kind: KindId| model.kinds.get(kind).base() == DETACH;
+    let is_one = |kind: KindId| model.kinds.get(kind).base() == base;
     places.filter(|(kind, _)| is_one(*kind)).map(|(_, span)| *span).min_by_key(|span| span.start)
 }

@@ -110,6 +110,8 @@ pub(super) struct Walk<'a> {
     parts_drawn: (u32, usize),
     /// The body that this module draws, by its number in the recorder.
     solid: Option<usize>,
+    /// Number of sources of gas that this module has drawn.
+    sources_drawn: u32,
 }
 
 impl<'a> Walk<'a> {
@@ -157,6 +159,7 @@ impl<'a> Walk<'a> {
             stems_drawn: 0,
             parts_drawn: (0, 0),
             solid: None,
+            sources_drawn: 0,
         }
     }
 
@@ -203,7 +206,7 @@ impl<'a> Walk<'a> {
         self.drawn = module;
         self.owner = None;
         (self.depth, self.stems_drawn, self.state.joined) = (self.stack.len(), 0, None);
-        self.parts_drawn.0 = 0;
+        (self.parts_drawn.0, self.sources_drawn) = (0, 0);
         self.solid = None;
         if let Some(recorder) = &mut self.recorder
             && recorder.solid_kinds.get(module.kind.index()) == Some(&true)
@@ -319,6 +322,7 @@ impl<'a> Walk<'a> {
                 }
             }
             Command::Plant(plant) => self.plant(plant, read)?,
+            Command::Source => self.let_out(read)?,
             Command::Detach => self.let_go(),
             Command::Ground => self.set_down(),
             Command::BeginPatch | Command::ControlPoint | Command::DrawPatch => self.patch(command, read)?,

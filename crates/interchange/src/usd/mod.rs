@@ -13,6 +13,7 @@ use std::collections::HashMap;
 use dlsys_geometry::scene::{Color, MaterialId, Palette, Texture};
 use dlsys_render::{GENERATOR, pictures, plain_name, push_number};
 
+use crate::gases::GasFrame;
 use crate::life::Life;
 use crate::mesh::Cutter;
 use crate::motion::{Clock, Moved};
@@ -126,6 +127,7 @@ impl Writer<'_> {
                 });
                 self.modules(text);
                 self.floor(text);
+                self.gases(text);
             },
         );
         self.text = text;
@@ -331,6 +333,41 @@ impl Writer<'_> {
         let primitive = Primitive { material, triangles, pinned: Vec::new(), points, normals };
         self.mesh(text, "ground", None, (&primitive, None));
     }
+
+    /// Gases as points with widths, at the frames. Their number changes, so programs show each frame until the next.
+    fn gases(&self, text: &mut Text) {
+        let mut names = Identifiers::default();
+        for gas in &self.growth.gases {
+            let name = names.choose(&format!("gas_{}", gas.name));
+            text.block(&format!("def Points \"{name}\" "), BRACES, |text| {
+                let frames = || gas.frames.iter().map(|frame| (frame.seconds * RATE, frame));
+                text.samples("float3[] extent", frames(), |out, frame| {
+                    tuples(out, &bounds_of(frame), self.decimals);
+                });
+                text.samples("point3f[] points", frames(), |out, frame| {
+                    tuples(out, &frame.points, self.decimals);
+                });
+                text.samples("float[] widths", frames(), |out, frame| {
+                    list(out, &frame.widths, |out, width| push_number(out, f64::from(width), self.decimals));
+                });
+                text.long("color3f[] primvars:displayColor = [", |out| {
+                    tuple(out, rgb(gas.color), OF_COLORS);
+                    out.push(']');
+                });
+            });
+        }
+    }
+}
+
+/// Opposite corners of the box around the blobs of a frame.
+fn bounds_of(frame: &GasFrame) -> [[f32; 3]; 2] {
+    let mut blobs = frame.points.iter().zip(&frame.widths);
+    let reach = |(point, width): (&[f32; 3], &f32), sign: f32| point.map(|x| x + sign * width / 2.0);
+    let Some(first) = blobs.next() else { return [[0.0; 3]; 2] };
+    blobs.fold([reach(first, -1.0), reach(first, 1.0)], |[low, high], blob| {
+        let (l, h) = (reach(blob, -1.0), reach(blob, 1.0));
+        [0, 1].map(|end| [0, 1, 2].map(|k| if end == 0 { low[k].min(l[k]) } else { high[k].max(h[k]) }))
+    })
 }
 
 /// Writes materials, and that of the floor, if there is one. Returns their names.

@@ -165,13 +165,16 @@ fn velocity(out: &mut String, v: Vector) {
     out.push(')');
 }
 
+/// The code of a sample, and its beginning and length in a file.
+type Sample = (f64, u64, u64);
+
 /// Samples in the order of frames, in a file without a name, and where they are in it.
 struct Spool {
     file: io::BufWriter<File>,
     end: u64,
     limit: u64,
-    /// By material and attribute: the code, the beginning and the length of each sample.
-    samples: BTreeMap<(usize, usize), Vec<(f64, u64, u64)>>,
+    /// By material and attribute.
+    samples: BTreeMap<(usize, usize), Vec<Sample>>,
     /// Materials, each with whether it has triangles now.
     seen: BTreeMap<usize, bool>,
     /// The code of the first frame.

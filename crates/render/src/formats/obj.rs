@@ -76,7 +76,8 @@ impl Exporter for Obj {
                 Part::Faces(items) => draft.groups(&solid, &names, &order[items.clone()]),
             }
         };
-        relay::write(writer.threads, parts.len(), make, |draft| draft.text.bytes(), out)
+        relay::write(writer.threads, parts.len(), make, |draft| draft.text.bytes(), out)?;
+        gases(scene, solid.counts[0], decimals, out)
     }
 
     fn companions(&self, scene: &Scene) -> Vec<Companion> {
@@ -91,6 +92,30 @@ impl Exporter for Obj {
         let copies = copies.map(|(picture, name)| Companion { name, bytes: picture.file.clone() });
         [library].into_iter().chain(copies).collect()
     }
+}
+
+/// The middles of blobs as points, in a group for each gas, behind so many vertices.
+fn gases(scene: &Scene, vertices: u32, decimals: usize, out: &mut (dyn Write + Send)) -> io::Result<()> {
+    // Of one line each, so that the text is never in memory as a whole.
+    const LINE: usize = 20;
+    let mut next = u64::from(vertices) + 1;
+    for gas in scene.gases.iter().filter(|gas| !gas.blobs.is_empty()) {
+        let mut text = Text::default();
+        for blobs in gas.blobs.chunks(PART) {
+            text.clear();
+            blobs.iter().for_each(|blob| text.triple(b"v", &blob.centre.coords, decimals));
+            out.write_all(text.bytes())?;
+        }
+        writeln!(out, "g gas.{}", gas.name)?;
+        let end = next + gas.blobs.len() as u64;
+        for first in (next..end).step_by(LINE) {
+            write!(out, "p")?;
+            (first..end.min(first + LINE as u64)).try_for_each(|number| write!(out, " {number}"))?;
+            writeln!(out)?;
+        }
+        next = end;
+    }
+    Ok(())
 }
 
 /// Parts of a list of items by owner in which no owner is cut.

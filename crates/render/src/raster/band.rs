@@ -148,7 +148,8 @@ impl<const N: usize> Band<N> {
         top: usize,
         pixels: &mut [[u8; 4]],
     ) {
-        let [first, end] = self.touched;
+        // Where something is drawn in front of nothing, too, all columns count.
+        let [first, end] = if triangles.is_veiled() { [0, self.width] } else { self.touched };
         let mut between = Between::default();
         let mut color = |place: u32, pixel: [usize; 2]| {
             let number = numbers[place as usize] as usize;
@@ -160,10 +161,13 @@ impl<const N: usize> Band<N> {
                 let at = [column, top + line];
                 let index = line * self.width + column;
                 *pixel = match self.pixels[index].seen {
-                    NOTHING => continue,
+                    NOTHING => match triangles.is_veiled() {
+                        true => triangles.open(at),
+                        false => continue,
+                    },
                     MIXED => {
                         let surface = |place: u32| triangles.surface(numbers[place as usize] as usize);
-                        self.shared[index].mean(surface, |place| color(place, at))
+                        self.shared[index].mean(surface, |place| color(place, at), || triangles.open(at))
                     }
                     place => color(place, at),
                 };

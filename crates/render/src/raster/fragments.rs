@@ -172,13 +172,15 @@ impl<const N: usize> Fragments<N> {
         won
     }
 
-    /// The mean colour of the samples. Each surface is shaded where its first sample is: the first ones are in the middle.
+    /// The mean colour of the samples, of which those of no surface have the colour `open`. Each surface is shaded where its first sample is:
+    /// the first ones are in the middle.
     pub(super) fn mean(
         &self,
         surface: impl Fn(u32) -> u32,
         mut color: impl FnMut(u32) -> [u8; 4],
+        open: impl FnOnce() -> [u8; 4],
     ) -> [u8; 4] {
-        let mut sum = [0_u32; 4];
+        let (mut sum, mut left) = ([0_u32; 4], N as u32);
         let count = self.count as usize;
         let surfaces: [u32; N] = {
             let mut surfaces = [0; N];
@@ -199,7 +201,11 @@ impl<const N: usize> Fragments<N> {
             }
             let painted = color(self.places[first]);
             let weight = mask.count_ones();
+            left -= weight;
             sum.iter_mut().zip(painted).for_each(|(sum, channel)| *sum += weight * u32::from(channel));
+        }
+        if left > 0 {
+            sum.iter_mut().zip(open()).for_each(|(sum, channel)| *sum += left * u32::from(channel));
         }
         sum.map(|total| ((total + N as u32 / 2) / N as u32) as u8)
     }

@@ -98,6 +98,16 @@ pub(super) trait Triangles: Sync {
         None
     }
 
+    /// Whether there may be a colour where no triangle is.
+    fn is_veiled(&self) -> bool {
+        false
+    }
+
+    /// The colour where no triangle is, as [`shade`](Triangles::shade) gives it.
+    fn open(&self, _pixel: [usize; 2]) -> [u8; 4] {
+        [0; 4]
+    }
+
     /// Red, green and blue, each times the opacity, and the opacity, in a pixel (column and row), at a place between the corners
     /// that has these weights.
     fn shade(&self, n: usize, pixel: [usize; 2], weights: [f64; 3]) -> [u8; 4];

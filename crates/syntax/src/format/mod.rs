@@ -121,6 +121,10 @@ mod tests {
                 "flow vortex -2 axis -1, 0, 0 at 0, -1, 0 decay 3",
             ),
             (
+                "gas a=size 2*e ,mass 1e-6,  color  \"#fff\",fall -1",
+                "gas a = size 2*e, mass 1e-6, color \"#fff\", fall -1",
+            ),
+            (
                 "tissue a=stiffness 2*e ,density 900, damping 0.05,sag,thickness 1e-4",
                 "tissue a = stiffness 2*e, density 900, damping 0.05, sag, thickness 1e-4",
             ),

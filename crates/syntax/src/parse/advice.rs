@@ -40,9 +40,12 @@ pub fn for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> 
     }
 }
 
-/// Advice for units, wind, flows and tissues, given the text before the error, the token there, and the text from it on.
+/// Advice for units, wind, flows, tissues and gases, given the text before the error, the token there, and the text from it on.
 pub fn for_scene(item: Rule, before: &str, found: &str, rest: &str) -> Option<String> {
-    if !matches!(item, Rule::units_item | Rule::wind_item | Rule::flow_item | Rule::tissue_item) {
+    if !matches!(
+        item,
+        Rule::units_item | Rule::wind_item | Rule::flow_item | Rule::tissue_item | Rule::gas_item
+    ) {
         return None;
     }
     let options = Declaration::of_rule(item)?.options.iter().map(|option| option.word);
@@ -68,7 +71,9 @@ pub fn for_scene(item: Rule, before: &str, found: &str, rest: &str) -> Option<St
         Rule::flow_item if before.matches(',').count() < 2 && kind == "uniform" => {
             "its velocity is three numbers: `flow uniform 1, 0, 0`"
         }
-        Rule::tissue_item | Rule::units_item if options.clone().any(|word| word == found) => {
+        Rule::tissue_item | Rule::gas_item | Rule::units_item
+            if options.clone().any(|word| word == found) =>
+        {
             return Some(format!("its parts are separated by commas: {}", usage(item)));
         }
         _ => return nearest(found, options).map(|word| format!("did you mean `{word}`?")),

@@ -54,6 +54,7 @@ fn words(rule: Rule) -> Option<&'static str> {
         flow_kind | uniform | flow_word => "`uniform`, `source`, `sink` or `vortex`",
         flow_part | flow_place | decay => "an option such as `at`",
         tissue_part | tissue_word | sag => "`stiffness`, `density`, `damping`, `thickness` or `sag`",
+        gas_part | gas_word | gas_color => "a value such as `size 0.01`",
         point => "a point such as `(1, 0.5)`",
         equation | derivative | rate | zero => "an equation such as `dx/dt = …`, `x = …` or `0 = …`",
         equals => "`=`",

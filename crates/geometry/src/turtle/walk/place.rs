@@ -7,7 +7,9 @@ use super::super::free::FreePart;
 use super::super::skeleton::Origin;
 use super::super::{Error, Pose};
 use super::{DrawnModule, Outline, Walk};
-use crate::scene::{MaterialId, Patch, Placement, Point, Polygon, Seedling, Shape, Surface, Vector};
+use crate::scene::{
+    GasSource, MaterialId, Patch, Placement, Point, Polygon, Seedling, Shape, SourceKey, Surface, Vector,
+};
 
 impl Walk<'_> {
     /// Makes the position a vertex of the open polygon.
@@ -113,6 +115,36 @@ impl Walk<'_> {
         let placement = Placement::uniform(self.seen(self.state.position), [-left, heading, up], 1.0);
         let (seed, owner) = (parameters.get(1).copied(), self.owner());
         self.scene.seedlings.push(Seedling { plant, birth, age, seed, placement, owner });
+        Ok(())
+    }
+
+    /// Notes a source of gas at the turtle's position: the number of the gas, the rate, and the radius.
+    pub(super) fn let_out(&mut self, parameters: &[f64]) -> Result<(), Error> {
+        let mut given = parameters.iter().copied();
+        let mut next = || given.next().unwrap_or(0.0);
+        let (number, rate, radius) = (next().round(), next(), next());
+        let key = SourceKey { module: self.drawn.lineage.id, number: self.sources_drawn };
+        self.sources_drawn += 1;
+        let count = self.model.scenery.gases.len();
+        if !(1.0..=count as f64).contains(&number) {
+            self.remark(Remark::NoGas(number, count));
+            return Ok(());
+        }
+        /// What is nearer to 0 is the rounding of something that is 0.
+        const ROUNDING: f64 = -1e-9;
+        if rate < ROUNDING {
+            self.remark(Remark::NegativeRate(rate));
+        }
+        let DrawnModule { kind, lineage } = self.drawn;
+        let source = GasSource {
+            key,
+            origin: Origin { kind, lineage, inside: self.inside },
+            gas: number as usize - 1,
+            at: self.seen(self.state.position),
+            rate: self.in_range(rate.max(0.0))?,
+            radius: self.in_range(radius.abs())?,
+        };
+        self.scene.sources.push(source);
         Ok(())
     }
 
