@@ -106,8 +106,8 @@ impl Hinge {
         let Some((change, gradient)) = self.fold(x) else { return };
         let viscous = weights.rate * wrapped(change - base);
         let moment = self.stiffness * (2.0 * libm::sin(change / 2.0) + viscous);
-        for k in 0..4 {
-            assembly.forces[self.points[k]] -= gradient[k] * moment;
+        for (point, gradient) in self.points.into_iter().zip(&gradient) {
+            assembly.forces[point] -= gradient * moment;
         }
         let viscous = weights.material - weights.stiffness;
         let sum = self.stiffness * (libm::cos(change / 2.0).max(0.0) * weights.stiffness + viscous);

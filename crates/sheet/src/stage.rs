@@ -129,7 +129,8 @@ impl Newton {
         let points = around.sheet.len();
         let mut size = 0.0;
         let mut meet = |way: f64| {
-            if !(way <= size) {
+            // A way that is no number stays.
+            if way > size || way.is_nan() {
                 size = way;
             }
         };
@@ -177,11 +178,11 @@ impl Newton {
         }
         self.right.clear();
         self.right.extend(self.forces.iter().map(|force| force * s));
-        for k in 0..points {
+        for (k, velocity) in v.iter().enumerate().take(points) {
             if sheet.pinned[k] {
                 self.right[k] = Vector::zeros();
             } else {
-                self.right[k] -= (v[k] - base.velocities[k]) * sheet.masses[k];
+                self.right[k] -= (velocity - base.velocities[k]) * sheet.masses[k];
             }
         }
         for (number, (free, body)) in self.free.iter().zip(&state.bodies).enumerate() {
