@@ -231,6 +231,11 @@ const POINT: &str = "a number begins with a digit: `0.5`";
 const ROUND: &str = "parameters stand in round parentheses: `A(x)`";
 const ARROW: &str = "in a clause a production is written `if x = 2 produce …`; a discrete rule has its arrow behind the head: `A(x) : x > 3 -> …`";
 
+/// True if a text begins with a number that has no digit before its point.
+fn begins_with_a_point(text: &str) -> bool {
+    text.trim_start().strip_prefix('.').is_some_and(|behind| behind.starts_with(|c: char| c.is_ascii_digit()))
+}
+
 /// Hints for discrete rules.
 fn hint_for_step(text: &str, at: usize, found: &str) -> Option<String> {
     let before = text[..at].trim_end();
@@ -254,7 +259,7 @@ fn hint_for_step(text: &str, at: usize, found: &str) -> Option<String> {
         _ if !has_arrow && found.starts_with(|c: char| c.is_ascii_digit()) => {
             "a head names its parameters; values belong to the initial string and to successors"
         }
-        "." if rest[1..].starts_with(|c: char| c.is_ascii_digit()) => POINT,
+        "." if begins_with_a_point(rest) => POINT,
         ":" if has_arrow => "the condition stands before the arrow: `A(x) : x > 3 -> F(x)`",
         ">" | "→" if has_arrow => "a rule has one arrow; a new rule begins on a line of its own",
         "," if has_arrow => NO_COMMAS,
@@ -284,7 +289,7 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
     let last_word = line.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default();
     let advice = match found {
         "ignore" | "consider" | "solid" => "brackets cannot be chosen: they are no modules",
-        "." if rest[1..].starts_with(|c: char| c.is_ascii_digit()) => POINT,
+        "." if begins_with_a_point(rest) => POINT,
         _ if last_word == "not" => "“not” is written `!`",
         "if" | "then" | "else" | "solve" | "produce" if is_item_with_name(item) && !before.contains('=') => {
             "this word is reserved: choose another name"
