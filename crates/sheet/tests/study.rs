@@ -51,7 +51,7 @@ fn collisions_keep_momentum_and_make_no_energy() -> Result<(), Error> {
     let rows = study::collision()?;
     let (angular, exact): (Vec<_>, Vec<_>) = rows.into_iter().partition(|row| row.case.contains("angular"));
     assert!(exact.iter().all(|row| row.error < 1e-8), "{exact:?}");
-    // Steps end before the contact does, so what turns is kept to a few tolerances only.
+    // Linear momentum is kept to rounding, angular momentum to a few tolerances.
     assert!(angular.iter().all(|row| row.error < 3.0 * row.resolution), "{angular:?}");
     Ok(())
 }
