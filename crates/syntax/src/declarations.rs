@@ -323,8 +323,8 @@ pub static DECLARATIONS: [Declaration; 31] = [
         ..row("tissue", Rule::tissue_item)
     },
     Declaration {
-        usage: "NAME = diffusion K, decay A, size S, mass M, extinction X, albedo O, glow Q, fall V, color \"#rrggbb\"",
-        summary: "smoke, steam or pollen, used as `@S(NAME, rate, radius)`: m²/s, 1/s, m, kg, m²/kg, fall in m/s",
+        usage: "NAME = size S, mass M, extinction X, diffusion K, decay A, …",
+        summary: "smoke, steam or pollen that the wind carries, used as `@S(NAME, rate, radius)`",
         category: Category::Scene,
         named: Named::Word,
         repeats: Repeats::PerName("value"),
