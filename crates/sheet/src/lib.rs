@@ -29,9 +29,8 @@
 //! ```
 //!
 //! The equations are solved by Newton's method with a search along each way; contacts are found again in each iteration, free solids are unknowns
-//! of the same system, so momentum is kept. Linear systems are solved by conjugate gradients with symmetric Gauss-Seidel as
-//! preconditioner, in one thread and in one order. A step that is linear in forces (ROS2) needs steps several times as short for a
-//! ball in a net: forces of viscosity and of contacts turn within the step. What would meet within a step is stopped by impulses at its beginning.
+//! of the same system: momentum is kept to rounding, angular momentum to a few tolerances. Linear systems are solved by conjugate gradients
+//! with symmetric Gauss-Seidel as preconditioner, in one thread and in one order. What would meet within a step is stopped by impulses at its beginning.
 //! A step is repeated with half its length or less if its error is too large, if its equations are not solved, if solid and sheet
 //! move by more than the solid's radius relative to each other while they are near, or if the sheet gets too deep in a solid.
 //!

@@ -11,6 +11,8 @@ const HALF: f64 = 0.5;
 const BELOW: f64 = 3.0;
 /// Columns in half the width.
 const FINENESS: [i32; 3] = [4, 8, 16];
+/// The same for the square: 4 columns are too few for its order.
+const FINER: [i32; 3] = [6, 12, 24];
 
 /// What lies on columns for which `on` holds after all that was piled up has slipped off, in m³.
 fn carried(
@@ -80,7 +82,7 @@ pub fn disc() -> Result<Vec<Convergence>, Error> {
 pub fn square() -> Result<Vec<Convergence>, Error> {
     let rim = [[HALF, HALF], [HALF, -HALF], [-HALF, -HALF], [-HALF, HALF]];
     let mut found = Vec::new();
-    for n in FINENESS {
+    for n in FINER {
         // Edges halfway between columns; the volume goes with the cube of the width.
         let shrink = (f64::from(n) + 0.5) / f64::from(n);
         let rim = rim.map(|corner| corner.map(|at| at * shrink));

@@ -2,7 +2,7 @@
 
 use dlsys_wind::study::Convergence;
 
-use super::{TOLERANCES, within};
+use super::{TIGHT, TOLERANCES, within};
 use crate::{
     Air, Error, Mesh, Place, Settings, Shape, Sheet, Solid, Solver, State, Step, Still, Tissue, Vector,
 };
@@ -35,7 +35,7 @@ pub fn collision() -> Result<Vec<Convergence>, Error> {
     let shape = Shape::ball(radius)?;
     let solids = [Solid::free_ball(&shape, mass)];
     let (mut linear, mut angular, mut gain) = (Vec::new(), Vec::new(), Vec::new());
-    for tolerance in TOLERANCES {
+    for tolerance in TIGHT {
         let settings = Settings { air: Air::none(), ..within(tolerance) };
         let mut ball = Place::at(Vector::new(0.12, 0.15, 0.05)).moving(Vector::new(0.3, -2.0, 0.1));
         ball.spin = Vector::new(0.0, 0.0, 15.0);

@@ -38,6 +38,8 @@ pub const EXACT_CASES: [Case; 11] = [
 
 /// The tolerances of the study.
 const TOLERANCES: [f64; 3] = [1e-3, 1e-4, 1e-5];
+/// With a tighter one, for errors that fall by less than the tolerance.
+const TIGHT: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
 
 /// Settings with steps of one length (s), or with a tolerance and a longest step.
 fn fixed(step: f64) -> Settings {

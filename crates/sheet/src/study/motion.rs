@@ -2,7 +2,7 @@
 
 use dlsys_wind::study::Convergence;
 
-use super::{TOLERANCES, fixed, within};
+use super::{TIGHT, TOLERANCES, fixed, within};
 use crate::{Air, Error, Mesh, Settings, Sheet, Solver, State, Still, Tissue, Vector};
 
 /// A stretched cord of 16 pieces in its first mode: the place of its middle after 1⅛ periods, in units of the amplitude, by the number of steps a
@@ -61,7 +61,7 @@ pub fn pendulum() -> Result<Vec<Convergence>, Error> {
     let end = Vector::new(libm::sin(1.0), -libm::cos(1.0), 0.0) * length;
     let sheet = Sheet::new(&Mesh::cord(Vector::zeros(), end, 1), &tissue, |point| point.y == 0.0)?;
     let mut found = Vec::new();
-    for tolerance in TOLERANCES {
+    for tolerance in TIGHT {
         let settings = Settings { air: Air { density: 0.0, ..Air::default() }, ..within(tolerance) };
         let mut state = State::at_rest(&sheet);
         Solver::new(settings).advance(&sheet, &mut state, 0.0..1.25 * period, &[], &Still, |_| ())?;
