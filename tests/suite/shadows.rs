@@ -198,6 +198,36 @@ fn plants_count_in_bounds_and_are_drawn_where_they_stand() {
     assert_eq!(mesh.matches("\ng F.").count(), 6, "{}", &mesh[..400]);
 }
 
+/// Stems of plants that stand on the scene's floor widen towards it, in pixels as in meshes; those above it do not.
+#[test]
+fn plants_on_a_floor_have_feet() {
+    let mut scene = row(scene("!(0.5)F(3)"), 2, 4.0);
+    scene.surroundings.floor = Some(0.0);
+    scene.plants[1].placement.origin.y = 0.1;
+    let fit = fit(&scene, "front");
+    let page = Page::new(fit.picture, Size::Width(600), None).expect("small");
+    let pixels = pixels_by(&scene, &fit, &page, Smoothness::Fine, 1);
+    let [left, bottom, width, height] = page.picture.area;
+    let [w, h] = page.pixels.map(f64::from);
+    let is_drawn = |x: f64, y: f64| {
+        let (column, row) = ((x - left) / width * w, (bottom + height - y) / height * h);
+        pixels[row as usize * page.pixels[0] as usize + column as usize][3] == 255
+    };
+    // Beside the stem, of radius 0.5, and just above its lower end.
+    let beside = [(0.56, 0.03), (0.56, 2.0), (4.56, 0.13), (4.0, 0.13)].map(|(x, y)| is_drawn(x, y));
+    assert_eq!(beside, [true, false, false, true]);
+    let mesh = String::from_utf8(FrameWriter::new(Format::OBJ, fit).write(&scene, "")).expect("UTF-8");
+    let stems = mesh.lines().filter_map(|line| {
+        let mut numbers = line.strip_prefix("v ")?.split(' ').filter_map(|number| number.parse::<f64>().ok());
+        Some([numbers.next()?, numbers.next()?])
+    });
+    let widest = |from: f64, to: f64| {
+        let near = stems.clone().filter(|[x, y]| (from..to).contains(x) && (-0.01..0.2).contains(y));
+        near.fold(f64::MIN, |most, [x, _]| most.max(x))
+    };
+    assert!(widest(-1.0, 1.0) > 0.6 && widest(3.0, 5.0) < 4.51, "{} {}", widest(-1.0, 1.0), widest(3.0, 5.0));
+}
+
 #[test]
 fn detail_follows_the_picture_but_never_the_mesh() {
     let plant = scene("!(0.1)F(1)[+(40)@K(0.5)]F(1)@L(0.7)");

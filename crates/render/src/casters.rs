@@ -133,6 +133,7 @@ impl<'s> Casters<'s> {
             accuracy: self.fit.accuracy,
             scale: self.scale,
             is_flat: false,
+            floor: group.scene.surroundings.floor,
         };
         Draft::new(group.scene, group.default_width, &detail)
     }

@@ -39,6 +39,8 @@ pub(super) struct Detail<'d, S> {
     pub(super) scale: f64,
     /// The drawing has no depth: every stem is a tube with an outline of exact width.
     pub(super) is_flat: bool,
+    /// Height of the floor, if there is one.
+    pub(super) floor: Option<f64>,
 }
 
 /// A scene as triangles and ribbons.
@@ -95,6 +97,7 @@ impl<'s> Draft<'s> {
             sides: 0,
             accuracy: SLACK / detail.scale,
             grown: !detail.is_flat,
+            floor: detail.floor,
             steady: false,
         };
         let tubes = Tubes::of(scene, style, sides, |i| !is_thin[i]);

@@ -255,7 +255,14 @@ impl Fit {
     /// How stems become tubes. Without depth they are lines of a diagram, and their joints keep their shape.
     pub(super) fn tubes(&self) -> TubeStyle {
         let Fit { default_width, accuracy, .. } = *self;
-        TubeStyle { default_width, sides: 0, accuracy, grown: !self.light.is_flat(), steady: false }
+        TubeStyle {
+            default_width,
+            sides: 0,
+            accuracy,
+            grown: !self.light.is_flat(),
+            floor: None,
+            steady: false,
+        }
     }
 
     /// The surroundings of a frame: those of flags, and those that its scene declares.

@@ -58,9 +58,12 @@ struct Plan<'s> {
     parts: Vec<Part>,
     colors: Vec<Color>,
     textures: Vec<Option<&'s Texture>>,
-    /// The looks of plants so far by the address of their scene, and their drafts by their size, in half powers of two; plants in plants share them.
+    /// The looks of plants so far by the address of their scene, and their drafts by their size, in half powers of two, and by whether they stand on
+    /// the floor; plants in plants share them.
     looks: HashMap<usize, Option<Look>>,
-    drafted: HashMap<(usize, i32), usize>,
+    drafted: HashMap<(usize, i32, bool), usize>,
+    /// Height of the floor.
+    floor: Option<f64>,
 }
 
 /// A draft that is yet to be made.
@@ -68,6 +71,8 @@ struct Wanted<'s> {
     scene: &'s Scene,
     default_width: f64,
     size: Size,
+    /// Height of the floor in the plant's coordinates, if it stands on one.
+    floor: Option<f64>,
     /// Number of parts.
     uses: usize,
 }
@@ -99,6 +104,7 @@ impl<'s> Stage<'s> {
             textures: Vec::new(),
             looks: HashMap::new(),
             drafted: HashMap::new(),
+            floor: scene.surroundings.floor,
         };
         plan.add_colors(scene);
         plan.add_plants(scene, None, lens);
@@ -108,6 +114,7 @@ impl<'s> Stage<'s> {
             accuracy: fit.accuracy,
             scale: lens.scale(),
             is_flat: fit.light.is_flat(),
+            floor: scene.surroundings.floor,
         };
         let shared = plan.wanted.iter().map(|_| OnceLock::new()).collect();
         let scene = Draft::new(scene, fit.default_width, &detail);
@@ -136,11 +143,11 @@ impl<'s> Stage<'s> {
 
 impl<'s> Wanted<'s> {
     fn draft(&self, fit: &Fit, lens: &Lens) -> Draft<'s> {
-        let (accuracy, scale, is_flat) = (fit.accuracy, lens.scale(), false);
+        let (accuracy, scale, is_flat, floor) = (fit.accuracy, lens.scale(), false, self.floor);
         match self.size {
             Size::Even(seen) => {
                 let scale_at = |_| seen;
-                let detail = Detail { scale_at, scale_of: None, accuracy, scale, is_flat };
+                let detail = Detail { scale_at, scale_of: None, accuracy, scale, is_flat, floor };
                 Draft::new(self.scene, self.default_width, &detail)
             }
             Size::Near(placement) => {
@@ -148,7 +155,7 @@ impl<'s> Wanted<'s> {
                 let scale_at = |p| lens.scale_at(placement.point(p)) * larger;
                 let scale_of =
                     |p, radius: f64| lens.scale_within(placement.point(p), radius * larger) * larger;
-                let detail = Detail { scale_at, scale_of: Some(&scale_of), accuracy, scale, is_flat };
+                let detail = Detail { scale_at, scale_of: Some(&scale_of), accuracy, scale, is_flat, floor };
                 Draft::new(self.scene, self.default_width, &detail)
             }
         }
@@ -172,16 +179,17 @@ impl<'s> Plan<'s> {
             let Some(seen) = lens.scale_of(centre, radius) else { continue };
             let scene = &plant.scene;
             let wanted = &mut self.wanted;
+            let floor = self.floor.filter(|floor| stands_on(*floor, &placement, look.radius)).map(|_| 0.0);
             // The scene itself is the first draft.
             let mut add = |size| {
-                wanted.push(Wanted { scene, default_width: look.default_width, size, uses: 0 });
+                wanted.push(Wanted { scene, default_width: look.default_width, size, floor, uses: 0 });
                 wanted.len()
             };
             let draft = if seen <= NEAR * lens.scale_at(centre) {
                 let exponent = (2.0 * (seen * placement.largest()).log2()).ceil().clamp(-120.0, 120.0);
                 let size = Size::Even((exponent / 2.0).exp2());
                 let exponent = exponent as i32;
-                *self.drafted.entry((key, exponent)).or_insert_with(|| add(size))
+                *self.drafted.entry((key, exponent, floor.is_some())).or_insert_with(|| add(size))
             } else {
                 add(Size::Near(placement))
             };
@@ -215,4 +223,10 @@ impl<'s> Plan<'s> {
             colors,
         })
     }
+}
+
+/// Whether a plant with its parts within this radius stands upright on a floor: its height 0 is there.
+fn stands_on(floor: f64, placement: &Placement, radius: f64) -> bool {
+    let is_upright = placement.axes[1].y >= 1.0 - 1e-12;
+    is_upright && (placement.origin.y - floor).abs() <= 1e-9 * radius * placement.largest()
 }

@@ -46,6 +46,8 @@ pub(super) struct TubeStyle {
     pub(super) accuracy: f64,
     /// Whether joints look grown.
     pub(super) grown: bool,
+    /// Height of the floor, in scene units: the stems that stand there have a foot.
+    pub(super) floor: Option<f64>,
     /// Whether joints have as many cross-sections in all frames, and bends none, for pieces that are followed from frame to
     /// frame.
     pub(super) steady: bool,
@@ -109,6 +111,7 @@ impl<'s> Tubes<'s> {
             0 => sides_for(radius, style.accuracy),
             sides => sides.max(3),
         };
+        let style = TubeStyle { floor: scene.surroundings.floor, ..style };
         Tubes::of(scene, style, sides, |_| true)
     }
 
@@ -146,7 +149,7 @@ impl<'s> Tubes<'s> {
                 tubes.profiles.len() - 1
             });
             let (begin, collar) = match style.grown {
-                true => structure.beginning(scene, first, style.accuracy),
+                true => structure.beginning(scene, first, &style),
                 false => (Begin::Dome, None),
             };
             let radii = &structure.radii;

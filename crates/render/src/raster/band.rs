@@ -208,12 +208,13 @@ fn nearest_first(triangles: &impl Triangles, numbers: &[u32]) -> impl Iterator<I
 #[derive(Default)]
 struct Between {
     number: Option<usize>,
+    corners: [[f64; 2]; 3],
     /// For the sides opposite of the first two corners the function of a place: `[a, b, c]`; in parts of the area.
     sides: [[f64; 3]; 2],
 }
 
 impl Between {
-    /// The weights of a triangle's corners in the middle of a pixel, or near it if that is outside.
+    /// The weights of a triangle's corners in the middle of a pixel, or at the place nearest to it if that is outside.
     fn weights(
         &mut self,
         number: usize,
@@ -229,6 +230,7 @@ impl Between {
                 [a, b, -(a * from[0] + b * from[1])]
             };
             self.sides = [side(q, r), side(r, p)];
+            self.corners = [p, q, r];
         }
         let middle = |at: usize| (at as i64 * STEPS + STEPS / 2) as f64;
         let (x, y) = (middle(column), middle(row));
@@ -237,8 +239,46 @@ impl Between {
         if u >= 0.0 && v >= 0.0 && w >= 0.0 {
             return [u, v, w];
         }
-        let [u, v, w] = [u.max(0.0), v.max(0.0), w.max(0.0)];
-        let sum = u + v + w;
-        [u / sum, v / sum, w / sum]
+        nearest_on_sides(self.corners, [x, y])
+    }
+}
+
+/// The weights of a triangle's corners at the place on its sides that is nearest to this one. Weights below zero that are only cut off give a
+/// place far away along a narrow triangle.
+fn nearest_on_sides(corners: [[f64; 2]; 3], [x, y]: [f64; 2]) -> [f64; 3] {
+    let mut nearest = (f64::INFINITY, [1.0, 0.0, 0.0]);
+    for k in 0..3 {
+        let l = (k + 1) % 3;
+        let ([px, py], [qx, qy]) = (corners[k], corners[l]);
+        let (dx, dy) = (qx - px, qy - py);
+        let part = (((x - px) * dx + (y - py) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
+        let (ex, ey) = (px + part * dx - x, py + part * dy - y);
+        let distance = ex * ex + ey * ey;
+        if distance < nearest.0 {
+            let mut weights = [0.0; 3];
+            (weights[k], weights[l]) = (1.0 - part, part);
+            nearest = (distance, weights);
+        }
+    }
+    nearest.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_of_a_pixel_beside_a_narrow_triangle_are_those_of_the_place_next_to_it() {
+        let place = |x: i32, y: i32| Place { x, y, depth: 0.0 };
+        // Half a pixel wide at its upper end, 100 pixels long.
+        let corners = [place(0, 25_600), place(0, 0), place(128, 0)];
+        let mut between = Between::default();
+        for row in 0..100 {
+            let [low, left, right] = between.weights(0, || corners, [0, row]);
+            let at = 25_600.0 * low / 256.0;
+            assert!((at - (row as f64 + 0.5)).abs() < 1e-2 && left.abs() < 1e-12, "{row}: {at}, {left}");
+            assert!((low + left + right - 1.0).abs() < 1e-12);
+        }
+        assert_eq!(between.weights(0, || corners, [1, 200]), [1.0, 0.0, 0.0]);
     }
 }

@@ -1,6 +1,6 @@
 //! How the segments of a scene hang together: which of them share a ring, and how each tube begins.
 
-use super::{Begin, Collar, NONE, can_join};
+use super::{Begin, Collar, NONE, TubeStyle, can_join};
 use dlsys_geometry::scene::{Scene, Segment};
 
 /// How segments hang together.
@@ -43,7 +43,12 @@ impl Structure {
     }
 
     /// How the tube begins whose first segment this is, and its collar.
-    pub(super) fn beginning(&self, scene: &Scene, first: usize, accuracy: f64) -> (Begin, Option<Collar>) {
+    pub(super) fn beginning(
+        &self,
+        scene: &Scene,
+        first: usize,
+        style: &TubeStyle,
+    ) -> (Begin, Option<Collar>) {
         let segment = &scene.segments[first];
         let (start, radius) = (segment.start, self.radii[first][0]);
         if radius <= 0.0 || segment.follows.is_some() {
@@ -54,17 +59,17 @@ impl Structure {
             let ahead = Some(self.ahead[parent]).filter(|&i| i != NONE && self.radii[i][0] > 0.0);
             let ahead = ahead.map(|i| (scene.segments[i].direction, self.radii[i][0]));
             let back = (scene.segments[parent].direction, thickness);
-            let collar = Collar::of_branch([start.coords, segment.direction], radius, back, ahead, accuracy);
+            let collar =
+                Collar::of_branch([start.coords, segment.direction], radius, back, ahead, style.accuracy);
             // A thicker one would show its cut.
             let begin = if radius <= 1.001 * thickness { Begin::Flat } else { Begin::Dome };
             return (begin, collar.filter(|_| begin == Begin::Flat));
         }
-        let ground = scene.surroundings.floor.unwrap_or(0.0);
+        let ground = style.floor.unwrap_or(0.0);
         if (start.y - ground).abs() > 1e-6 * radius || segment.direction.y < 0.5 {
             return (Begin::Dome, None);
         }
-        let foot =
-            scene.surroundings.floor.map(|_| Collar::of_foot(start, segment.direction, radius, ground));
+        let foot = style.floor.map(|_| Collar::of_foot(start, segment.direction, radius, ground));
         (Begin::Flat, foot)
     }
 }

@@ -128,6 +128,7 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (Some('&'), "&") if touching => "“and” is written with one `&`",
         (Some('|'), "|") if touching => "“or” is written with one `|`",
         (Some('*'), "*") if touching => "a power is written `x^2`",
+        (_, "?") => "a choice between numbers is written `if x > 1 then x else 0`",
         (_, _) if item == Rule::step_item => return hint_for_step(text, at, found),
         (Some('-'), ">") if touching => ARROW,
         (_, "→") => ARROW,
@@ -173,7 +174,7 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (_, "-" | "=") if item == Rule::frames_item => "frames are written `frames 0 .. 10 step 0.1`",
         (_, "=") if item == Rule::angle_item => "the angle is written `angle 45`",
         (_, ":") if matches!(item, Rule::ignore_item | Rule::consider_item) => {
-            "write the names after it: `ignore F_x @L`"
+            "names stand behind the word, without a colon: `ignore F_x @L`; turns and other symbols are passed over anyway"
         }
         (_, ",") if matches!(item, Rule::ignore_item | Rule::consider_item | Rule::solid_item) => {
             "there are spaces between names: `Ball Post`"
@@ -242,7 +243,9 @@ fn hint_for_step(text: &str, at: usize, found: &str) -> Option<String> {
     let rest = text[at..].trim_start();
     let has_arrow = before.contains("->") || before.contains('→');
     let advice = match found {
-        "" | "\n" if before.ends_with("->") || before.ends_with('→') => "to produce nothing, write `-> ε`",
+        "" | "\n" | "*" if before.ends_with("->") || before.ends_with('→') => {
+            "to produce nothing, write `-> ε`"
+        }
         "if" | "solve" | "produce" if has_arrow => {
             "a discrete rule has no clauses: it is `A(x) : x > 3 -> F(x)`; equations stand in a rule of their own, `A(x): solve …`"
         }
@@ -316,7 +319,9 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
             "an operator has something on both sides: add what is missing, or remove the sign"
         }
         _ if has_open_if(line) => "in an expression `if` has three parts: `if x < 1 then 0.5 else 0`",
-        _ if ended && before.ends_with("produce") => "to produce nothing, write `produce ε`",
+        _ if (ended || found == "*") && before.ends_with("produce") => {
+            "to produce nothing, write `produce ε`"
+        }
         _ if ended && in_rule && before.ends_with(':') => {
             "under its head a rule has clauses: `solve dx/dt = …`, `if x = 1 produce …`"
         }

@@ -1,5 +1,5 @@
 //! Prints the exact cases, random landings, and the cost of a body-second:
-//! `cargo run --release -p dlsys-fall --example table`. An argument is the number of random landings (400).
+//! `cargo run --release -p dlsys-fall --example fall_table`. An argument is the number of random landings (400).
 
 use std::time::Instant;
 

@@ -1,5 +1,5 @@
 //! Prints the exact cases, the hard cases and the methods side by side:
-//! `cargo run --release -p dlsys-sway --example table`. An argument is the number of segments of the longest chain (10000).
+//! `cargo run --release -p dlsys-sway --example sway_table`. An argument is the number of segments of the longest chain (10000).
 
 use dlsys_sway::study;
 use dlsys_wind::study::Convergence;
