@@ -31,9 +31,13 @@ pub(super) struct Batch<'s> {
 }
 
 impl Batch<'_> {
-    /// Begins the next one with the vertices from this one on.
-    fn begin(&mut self, first: usize) {
-        self.vertices.drain(..first);
+    /// How many more there is room for.
+    fn room(&self) -> usize {
+        BATCH.saturating_sub(self.triangles.len() + self.cut.len() + self.lines.len())
+    }
+
+    fn clear(&mut self) {
+        self.vertices.clear();
         self.triangles.clear();
         self.cut.clear();
         self.lines.clear();
@@ -138,14 +142,14 @@ impl<'s> Casters<'s> {
         Draft::new(group.scene, group.default_width, &detail)
     }
 
-    /// The triangles of a draft that cast shadows where it has this place.
-    fn faces<'d>(
+    /// Those of the triangles of a draft that cast shadows where it has this place.
+    fn casting<'d>(
         &self,
-        draft: &'d Draft,
+        faces: &'d [Triangle],
         place: Option<&Placement>,
     ) -> impl Iterator<Item = &'d Triangle> + use<'d> {
         let without = self.without.filter(|_| place.is_none());
-        draft.mesh.faces.iter().filter(move |face| Some(face.material) != without)
+        faces.iter().filter(move |face| Some(face.material) != without)
     }
 
     /// Finds the box around everything, and how much there is.
@@ -158,7 +162,7 @@ impl<'s> Casters<'s> {
             for place in &group.places {
                 let place = place.as_ref();
                 let vertices = &draft.mesh.vertices;
-                for (v, _) in self.faces(&draft, place).flat_map(|face| face.corners) {
+                for (v, _) in self.casting(&draft.mesh.faces, place).flat_map(|face| face.corners) {
                     let at = vertices[v as usize];
                     let at = place.map_or(at, |place| place.point(at)).coords;
                     (low, high) = (low.inf(&at), high.sup(&at));
@@ -166,7 +170,7 @@ impl<'s> Casters<'s> {
                 for end in draft.lines(place).flat_map(|(ends, _)| ends) {
                     (low, high) = (low.inf(&end.coords), high.sup(&end.coords));
                 }
-                count += self.faces(&draft, place).count() + draft.lines(place).count();
+                count += self.casting(&draft.mesh.faces, place).count() + draft.lines(place).count();
             }
             kept += draft.len();
             drafts.push(Some(draft).filter(|_| kept <= KEPT));
@@ -184,36 +188,41 @@ impl<'s> Casters<'s> {
             let p = p.coords - self.middle;
             [p.x as f32, p.y as f32, p.z as f32]
         };
-        let full = |batch: &Batch| batch.triangles.len() + batch.cut.len() + batch.lines.len() >= BATCH;
+        let mut pass_on = |batch: &mut Batch| {
+            if batch.room() == 0 {
+                visit(batch);
+                batch.clear();
+            }
+        };
         for (group, kept) in self.groups.iter().zip(&self.drafts) {
             let made = kept.is_none().then(|| self.draft(group));
             let Some(draft) = kept.as_ref().or(made.as_ref()) else { continue };
             for place in &group.places {
                 let place = place.as_ref();
-                let mut first = batch.vertices.len() as u32;
-                let vertices = draft.mesh.vertices.iter();
-                let placed = vertices.map(|&p| relative(place.map_or(p, |place| place.point(p))));
-                batch.vertices.extend(placed);
-                for face in self.faces(draft, place) {
-                    let corners = face.corners.map(|(v, _)| first + v);
-                    match draft.cut_out(face) {
-                        None => batch.triangles.push(corners),
-                        Some((places, texture)) => batch.cut.push((corners, places, texture)),
+                let mut rest = &draft.mesh.faces[..];
+                while !rest.is_empty() {
+                    let (faces, later) = rest.split_at(batch.room().min(rest.len()));
+                    rest = later;
+                    // Triangles that follow one another have vertices that do.
+                    let corners = self.casting(faces, place).flat_map(|face| face.corners.map(|(v, _)| v));
+                    let (low, end) =
+                        corners.fold((u32::MAX, 0), |(low, end), v| (low.min(v), end.max(v + 1)));
+                    let first = batch.vertices.len() as u32;
+                    let vertices = draft.mesh.vertices.get(low as usize..end as usize).unwrap_or_default();
+                    let placed = vertices.iter().map(|&p| relative(place.map_or(p, |place| place.point(p))));
+                    batch.vertices.extend(placed);
+                    for face in self.casting(faces, place) {
+                        let corners = face.corners.map(|(v, _)| first + (v - low));
+                        match draft.cut_out(face) {
+                            None => batch.triangles.push(corners),
+                            Some((places, texture)) => batch.cut.push((corners, places, texture)),
+                        }
                     }
-                    if full(&batch) {
-                        visit(&batch);
-                        // The other triangles have the same vertices.
-                        batch.begin(first as usize);
-                        first = 0;
-                    }
+                    pass_on(&mut batch);
                 }
                 for (ends, radii) in draft.lines(place) {
                     batch.lines.push((ends.map(relative), radii.map(|r| r as f32)));
-                    if full(&batch) {
-                        visit(&batch);
-                        batch.begin(first as usize);
-                        first = 0;
-                    }
+                    pass_on(&mut batch);
                 }
             }
         }
@@ -261,16 +270,22 @@ mod tests {
             casters.each_batch(|batch| {
                 let corners = |t: &[u32; 3]| t.map(|v| batch.vertices[v as usize]);
                 all.extend(batch.triangles.iter().map(corners));
-                most = most.max(batch.triangles.len());
+                most = most.max(batch.triangles.len().max(batch.vertices.len()));
             });
             (all, most)
         };
         let (kept, most) = collect(&casters);
         assert_eq!(kept.len(), casters.count());
-        assert!(kept.len() > BATCH && most <= BATCH, "{} {most}", kept.len());
+        assert!(kept.len() > BATCH && most < BATCH + BATCH / 8, "{} {most}", kept.len());
         assert_eq!(casters.groups.len(), 2, "one draft for all plants");
         casters.drafts.iter_mut().for_each(|draft| *draft = None);
         assert_eq!(collect(&casters).0, kept);
+        // One mesh of all of them goes in parts, too.
+        let flat = scene.flattened();
+        let whole = Casters::new(&flat, &fit, 40.0, |_| 40.0, None, |_, _| true);
+        let (passed, most) = collect(&whole);
+        assert_eq!(passed.len(), whole.count());
+        assert!(passed.len() > BATCH && most < BATCH + BATCH / 8, "{} {most}", passed.len());
         // Far away, a plant is two triangles.
         let far = Casters::new(&scene, &fit, 40.0, |_| 1e-3, None, |_, _| true);
         assert_eq!(far.count(), 6000);
