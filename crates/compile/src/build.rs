@@ -94,6 +94,7 @@ struct Parts<'d> {
     ignored: Vec<&'d ast::Name>,
     considered: Vec<&'d ast::Name>,
     solid: Vec<&'d ast::Name>,
+    shelf: Vec<&'d ast::Name>,
     axiom: Successor,
     axiom_span: Span,
     rules: Vec<DeclaredRule>,
@@ -129,6 +130,7 @@ impl<'d> Parts<'d> {
             Item::Ignore(names) => self.ignored.extend(names),
             Item::Consider(names) => self.considered.extend(names),
             Item::Solid(names) => self.solid.extend(names),
+            Item::Shelf(names) => self.shelf.extend(names),
             Item::Axiom(modules) => self.axiom(modules, span, builder),
             Item::Interpret { head, drawn } => {
                 self.heads.push(head);
@@ -214,7 +216,8 @@ impl<'d> Parts<'d> {
         let diagnostics = &mut scope.diagnostics;
         let interpretations = assign_interpretations(self.interpretations, &mut kinds, diagnostics);
         contexts::filter(&mut kinds, &self.ignored, &self.considered, diagnostics);
-        let solids = contexts::solids(&kinds, &self.solid, diagnostics);
+        let solids = contexts::bodies(&kinds, &self.solid, diagnostics);
+        let shelves = contexts::bodies(&kinds, &self.shelf, diagnostics);
         let rules = contexts::resolve_all(&kinds, self.rules, diagnostics);
         let Analysed { rules, drawn_only } = analyse(&mut scope.graph, &kinds, rules);
         let model = Model {
@@ -229,7 +232,7 @@ impl<'d> Parts<'d> {
             rules,
             interpretations,
             appearance: Arc::new(looks.appearance),
-            scenery: Scenery { solids, ..looks.scenery },
+            scenery: Scenery { solids, shelves, ..looks.scenery },
             drawn_only,
             curves: scope.graph.curves().to_vec(),
         };

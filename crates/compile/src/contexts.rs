@@ -95,8 +95,8 @@ fn resolve(
     pattern
 }
 
-/// The kinds that `solid` names.
-pub fn solids(kinds: &Kinds, names: &[&ast::Name], diagnostics: &mut Vec<Diagnostic>) -> Vec<(KindId, Span)> {
+/// The kinds that `solid` or `shelf` names.
+pub fn bodies(kinds: &Kinds, names: &[&ast::Name], diagnostics: &mut Vec<Diagnostic>) -> Vec<(KindId, Span)> {
     let index = ByName::new(kinds);
     let mut solids: Vec<(KindId, Span)> = Vec::new();
     for name in names {

@@ -37,6 +37,7 @@ mod scene_checks;
 mod scenery;
 mod scope;
 mod smooth;
+mod soils;
 mod strain;
 mod strings;
 mod surface;

@@ -6,7 +6,7 @@ use dlsys_expr::Program;
 use dlsys_model::{Flow, Primitive, Spectrum, Tissue, Units, Wind};
 use dlsys_syntax::ast::{Attribute, Expression, Name};
 
-/// Maximum number of tissues, of gases, and of flows, of one model.
+/// Maximum number of tissues, of gases, of soils, of pours, and of flows, of one model.
 pub(crate) const MAX_DECLARED: usize = 1000;
 /// Greatest seed: all whole numbers up to this one are numbers of the language.
 const MAX_SEED: f64 = 9_007_199_254_740_992.0;
@@ -258,7 +258,7 @@ impl Builder<'_> {
     }
 
     /// The value of an attribute that may depend on `t`, within the bounds of a quantity if it is a constant.
-    fn varying(&mut self, attribute: &Attribute, quantity: &Quantity) -> Option<Program> {
+    pub(crate) fn varying(&mut self, attribute: &Attribute, quantity: &Quantity) -> Option<Program> {
         let program = self.of_time(&attribute.values)?;
         if let (Some(&[value]), Some(&written)) = (program.constants(), attribute.values.first()) {
             return self.is_within(value, written, quantity).then_some(program);

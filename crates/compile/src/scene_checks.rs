@@ -26,7 +26,7 @@ pub fn is_hidden(model: &Model, kind: &Kind) -> bool {
 
 /// Reports `@G` in a model without a ground.
 pub fn ground(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
-    if model.scenery.ground.is_some() {
+    if model.scenery.ground.is_some() || model.scenery.bed.is_some() {
         return;
     }
     let stands = |kind: &Kind| kind.name == GROUND && !is_hidden(model, kind);
@@ -60,14 +60,14 @@ pub fn detach(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut V
     }
 }
 
-/// Reports names behind `solid` that are no modules of a string: a body is all that a module of the string draws.
+/// Reports names behind `solid` and `shelf` that are no modules of a string: a body is all that a module of the string draws.
 pub fn solids(
     model: &Model,
     occurs: &HashMap<KindId, Span>,
     drawn: &HashMap<KindId, Span>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
-    for (kind, span) in &model.scenery.solids {
+    for (kind, span) in model.scenery.solids.iter().chain(&model.scenery.shelves) {
         if occurs.contains_key(kind) {
             continue;
         }

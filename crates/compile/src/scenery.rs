@@ -51,6 +51,12 @@ pub(crate) fn build(
     nesting: &Nesting,
 ) -> Scenery {
     let mut builder = Builder { document, scope, files, scenery: Scenery::default(), seen: Vec::new() };
+    // Ground and what is poured name soils that may be declared behind them.
+    for (item, span) in &document.items {
+        if let Item::Soil { name, attributes } = item {
+            builder.soil(name, attributes, *span);
+        }
+    }
     for (item, span) in &document.items {
         match item {
             Item::Plant { name, file, settings } => {
@@ -60,6 +66,11 @@ pub(crate) fn build(
                 builder.once("ground", *span);
                 builder.scenery.ground = builder.scope.constant_value(&document.expressions, *height);
             }
+            Item::Bed { soil, file, attributes } => {
+                builder.once("ground", *span);
+                builder.bed((soil, file.as_ref()), attributes, *span);
+            }
+            Item::Pour { soil, attributes } => builder.pour(soil, attributes, *span),
             Item::Light(direction) => {
                 builder.once("light", *span);
                 let program = builder.of_time(direction);
@@ -88,6 +99,7 @@ pub(crate) fn build(
             _ => {}
         }
     }
+    builder.end_soils();
     builder.scenery
 }
 
@@ -95,7 +107,7 @@ pub(crate) fn build(
 pub(crate) struct Builder<'b> {
     pub(crate) document: &'b Document,
     pub(crate) scope: &'b mut Scope,
-    files: &'b dyn Files,
+    pub(crate) files: &'b dyn Files,
     pub(crate) scenery: Scenery,
     /// Declarations that may stand once, with their places.
     seen: Vec<(&'static str, Span)>,

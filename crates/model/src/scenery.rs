@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::{FieldCache, Flow, Gas, KindId, Model, Rgb, Tissue, Units, Wind};
+use crate::{Bed, FieldCache, Flow, Gas, KindId, Model, Pour, Rgb, Soil, Tissue, Units, Wind};
 use dlsys_diagnostic::{Source, Span};
 use dlsys_expr::Program;
 
 /// The declarations of a model that concern its surroundings: `plant`, `light`, `sky`, `camera`, `ground`, `units`, `wind`, `flow`,
-/// `tissue`, `gas`, `solid`.
+/// `tissue`, `gas`, `solid`, `shelf`, `soil`, `pour`.
 #[derive(Clone, Debug, Default)]
 pub struct Scenery {
     /// In the order written.
@@ -32,6 +32,14 @@ pub struct Scenery {
     pub gases: Vec<Gas>,
     /// The kinds of modules whose drawings are solid bodies, in the order written, with the places of their names.
     pub solids: Vec<(KindId, Span)>,
+    /// The kinds of modules whose drawings carry what falls on them, likewise.
+    pub shelves: Vec<(KindId, Span)>,
+    /// In the order written.
+    pub soils: Vec<Soil>,
+    /// Ground that gives way.
+    pub bed: Option<Bed>,
+    /// What is poured on it, in the order written.
+    pub pours: Vec<Pour>,
     /// The field of the wind.
     pub field: FieldCache,
 }

@@ -340,6 +340,31 @@ pub enum Item {
     },
     /// `solid names`: the modules whose drawings are solid bodies.
     Solid(Vec<Name>),
+    /// `shelf names`: the modules whose drawings carry what falls on them.
+    Shelf(Vec<Name>),
+    /// `soil name = sand, repose 30`: a granular material.
+    Soil {
+        /// The name that `ground` and `pour` give.
+        name: Name,
+        /// Its parts, in the order written; one without a value is the material that it begins from.
+        attributes: Vec<Attribute>,
+    },
+    /// `ground soil cell d depth h height f(x, z) extent e`: ground that gives way.
+    Bed {
+        /// The name of its soil.
+        soil: Name,
+        /// A file of heights.
+        file: Option<Text>,
+        /// Its values, in the order written.
+        attributes: Vec<Attribute>,
+    },
+    /// `pour soil rate r at x, y, z radius r`: material that is added.
+    Pour {
+        /// The name of its soil.
+        soil: Name,
+        /// Its values, in the order written.
+        attributes: Vec<Attribute>,
+    },
     /// `ignore names`: the modules that context matching passes over.
     Ignore(Vec<Name>),
     /// `consider names`: the only modules that context matching does not pass over.
@@ -387,6 +412,10 @@ impl Item {
             Item::Tissue { .. } => "tissue",
             Item::Gas { .. } => "gas",
             Item::Solid(_) => "solid",
+            Item::Shelf(_) => "shelf",
+            Item::Soil { .. } => "soil",
+            Item::Bed { .. } => "ground",
+            Item::Pour { .. } => "pour",
             Item::Ignore(_) => "ignore",
             Item::Consider(_) => "consider",
             Item::Axiom(_) => "initial",
@@ -411,6 +440,7 @@ impl Item {
             | Item::Plant { name, .. }
             | Item::Tissue { name, .. }
             | Item::Gas { name, .. }
+            | Item::Soil { name, .. }
             | Item::Contour { name, .. } => Some(name),
             _ => None,
         }

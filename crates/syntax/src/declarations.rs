@@ -73,7 +73,7 @@ const fn row(word: &'static str, rule: Rule) -> Declaration {
 }
 
 /// All declarations, in the order in which messages list them.
-pub static DECLARATIONS: [Declaration; 31] = [
+pub static DECLARATIONS: [Declaration; 34] = [
     Declaration {
         usage: "\"…\"",
         summary: "the title of the model, shown above its pictures",
@@ -228,11 +228,18 @@ pub static DECLARATIONS: [Declaration; 31] = [
         ..row("plant", Rule::plant_item)
     },
     Declaration {
-        usage: "HEIGHT",
-        summary: "a floor without end, on which shadows fall and `@G` sets the turtle",
+        usage: "HEIGHT, or SOIL cell D depth H height F(x, z) extent E",
+        summary: "what plants stand on: a floor without end, or soil that gives way",
         category: Category::Scene,
+        options: &[
+            option("from", Follow::Text),
+            option("cell", Follow::Value),
+            option("depth", Follow::Value),
+            option("height", Follow::Value),
+            option("extent", Follow::Value),
+        ],
         begins: Begins::BeforeValue,
-        written: "a floor is written `ground 0`",
+        written: "a floor is written `ground 0`; ground of a soil, `ground clay cell 0.01 depth 0.3`",
         ..row("ground", Rule::ground_item)
     },
     Declaration {
@@ -352,6 +359,56 @@ pub static DECLARATIONS: [Declaration; 31] = [
         begins: Begins::BeforeValue,
         written: "modules that are solid are written `solid Ball Post`",
         ..row("solid", Rule::solid_item)
+    },
+    Declaration {
+        usage: "NAME …",
+        summary: "modules whose drawings carry what falls on them, and press into nothing",
+        category: Category::Scene,
+        repeats: Repeats::Freely,
+        body: Body::Names,
+        begins: Begins::BeforeValue,
+        written: "modules that carry snow are written `shelf Leaf`",
+        ..row("shelf", Rule::shelf_item)
+    },
+    Declaration {
+        usage: "NAME = sand|mud|snow|soil, repose DEGREES, …",
+        summary: "a granular material, for `ground` and `pour`",
+        category: Category::Scene,
+        named: Named::Word,
+        repeats: Repeats::PerName("value"),
+        options: &[
+            option("sand", Follow::Nothing),
+            option("mud", Follow::Nothing),
+            option("snow", Follow::Nothing),
+            option("soil", Follow::Nothing),
+            option("repose", Follow::Value),
+            option("inner", Follow::Value),
+            option("push", Follow::Value),
+            option("rough", Follow::Value),
+            option("flow", Follow::Value),
+            option("cohesion", Follow::Value),
+            option("weight", Follow::Value),
+            option("swell", Follow::Value),
+            option("stick", Follow::Value),
+            option("shed", Follow::Value),
+        ],
+        begins: Begins::BeforeValue,
+        written: "a soil is written `soil powder = snow, repose 50`",
+        ..row("soil", Rule::soil_item)
+    },
+    Declaration {
+        usage: "SOIL rate R at X, Y, Z radius R",
+        summary: "material that is added: a volume for each unit of t, or a height everywhere",
+        category: Category::Scene,
+        repeats: Repeats::Freely,
+        options: &[
+            option("rate", Follow::Value),
+            option("at", Follow::Value),
+            option("radius", Follow::Value),
+        ],
+        begins: Begins::BeforeValue,
+        written: "snowfall is written `pour powder rate 0.02`; sand that is poured, `pour dry rate 0.5 at 0, 2, 0 radius 0.1`",
+        ..row("pour", Rule::pour_item)
     },
     Declaration {
         usage: "NAME …",

@@ -66,7 +66,10 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
         Rule::plant_item => {
             Item::Plant { name: parts.name(), file: parts.text(), settings: parts.assignments()? }
         }
-        Rule::ground_item => Item::Ground(parts.expression()?),
+        Rule::ground_item => match parts.name_if_any() {
+            Some(soil) => Item::Bed { soil, file: parts.text_if_any(), attributes: parts.attributes()? },
+            None => Item::Ground(parts.expression()?),
+        },
         Rule::light_item => Item::Light(parts.triple()?),
         Rule::sky_item => Item::Sky([parts.text(), parts.text()]),
         Rule::camera_item => {
@@ -82,6 +85,9 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
             Item::Gas { name, attributes, colors }
         }
         Rule::solid_item => Item::Solid(parts.names()),
+        Rule::shelf_item => Item::Shelf(parts.names()),
+        Rule::soil_item => Item::Soil { name: parts.name(), attributes: parts.attributes()? },
+        Rule::pour_item => Item::Pour { soil: parts.name(), attributes: parts.attributes()? },
         Rule::ignore_item => Item::Ignore(parts.names()),
         Rule::consider_item => Item::Consider(parts.names()),
         Rule::interpret_item => {
@@ -178,6 +184,19 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
             format!("gas {} = {}", name.text, all.join(", "))
         }
         Item::Solid(list) => format!("solid {}", print::names(list, " ")),
+        Item::Shelf(list) => format!("shelf {}", print::names(list, " ")),
+        Item::Soil { name, attributes } => {
+            format!("soil {} = {}", name.text, written(expressions, attributes, ", "))
+        }
+        Item::Bed { soil, file, attributes } => {
+            let from = file.as_ref().map(|file| format!("from \"{}\"", file.text));
+            let rest = (!attributes.is_empty()).then(|| written(expressions, attributes, " "));
+            let parts: Vec<String> = [from, rest].into_iter().flatten().collect();
+            format!("ground {} {}", soil.text, parts.join(" "))
+        }
+        Item::Pour { soil, attributes } => {
+            format!("pour {} {}", soil.text, written(expressions, attributes, " "))
+        }
         Item::Ignore(list) => format!("ignore {}", print::names(list, " ")),
         Item::Consider(list) => format!("consider {}", print::names(list, " ")),
         Item::Axiom(string) => format!("initial string: {}", print::modules(expressions, string)),
@@ -212,6 +231,10 @@ impl<'i> Parts<'_, '_, 'i> {
     fn name(&mut self) -> Name {
         let pair = self.pair();
         self.builder.name(&pair)
+    }
+
+    fn name_if_any(&mut self) -> Option<Name> {
+        self.pair_if(Rule::ident).map(|pair| self.builder.name(&pair))
     }
 
     fn names(&mut self) -> Vec<Name> {

@@ -42,10 +42,18 @@ pub fn for_block(item: Rule, before: &str, found: &str) -> Option<&'static str> 
 
 /// Advice for units, wind, flows, tissues and gases, given the text before the error, the token there, and the text from it on.
 pub fn for_scene(item: Rule, before: &str, found: &str, rest: &str) -> Option<String> {
-    if !matches!(
+    let is_scene = matches!(
         item,
-        Rule::units_item | Rule::wind_item | Rule::flow_item | Rule::tissue_item | Rule::gas_item
-    ) {
+        Rule::units_item
+            | Rule::wind_item
+            | Rule::flow_item
+            | Rule::tissue_item
+            | Rule::gas_item
+            | Rule::soil_item
+            | Rule::ground_item
+            | Rule::pour_item
+    );
+    if !is_scene {
         return None;
     }
     let options = Declaration::of_rule(item)?.options.iter().map(|option| option.word);
@@ -71,7 +79,7 @@ pub fn for_scene(item: Rule, before: &str, found: &str, rest: &str) -> Option<St
         Rule::flow_item if before.matches(',').count() < 2 && kind == "uniform" => {
             "its velocity is three numbers: `flow uniform 1, 0, 0`"
         }
-        Rule::tissue_item | Rule::gas_item | Rule::units_item
+        Rule::tissue_item | Rule::gas_item | Rule::units_item | Rule::soil_item
             if options.clone().any(|word| word == found) =>
         {
             return Some(format!("its parts are separated by commas: {}", usage(item)));

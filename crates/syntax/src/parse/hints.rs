@@ -176,7 +176,7 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (_, ":") if matches!(item, Rule::ignore_item | Rule::consider_item) => {
             "names stand behind the word, without a colon: `ignore F_x @L`; turns and other symbols are passed over anyway"
         }
-        (_, ",") if matches!(item, Rule::ignore_item | Rule::consider_item | Rule::solid_item) => {
+        (_, ",") if matches!(item, Rule::ignore_item | Rule::consider_item | Rule::solid_item | Rule::shelf_item) => {
             "there are spaces between names: `Ball Post`"
         }
         (_, "<" | ">") if item == Rule::interpret_item => {
@@ -291,7 +291,7 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
     let line = before.rsplit('\n').next().unwrap_or(before).trim();
     let last_word = line.rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or_default();
     let advice = match found {
-        "ignore" | "consider" | "solid" => "brackets cannot be chosen: they are no modules",
+        "ignore" | "consider" | "solid" | "shelf" => "brackets cannot be chosen: they are no modules",
         "." if begins_with_a_point(rest) => POINT,
         _ if last_word == "not" => "“not” is written `!`",
         "if" | "then" | "else" | "solve" | "produce" if is_item_with_name(item) && !before.contains('=') => {
