@@ -53,8 +53,8 @@ pub(crate) fn build(
     let mut builder = Builder { document, scope, files, scenery: Scenery::default(), seen: Vec::new() };
     // Ground and what is poured name soils that may be declared behind them.
     for (item, span) in &document.items {
-        if let Item::Soil { name, attributes } = item {
-            builder.soil(name, attributes, *span);
+        if let Item::Soil { name, attributes, colors } = item {
+            builder.soil(name, (attributes, colors), *span);
         }
     }
     for (item, span) in &document.items {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::appearance::color;
 use crate::physics::{MAX_DECLARED, Quantity, not_negative, positive, shown};
 use crate::scenery::Builder;
 use crate::scope::Variables;
@@ -56,13 +57,6 @@ const SWELL: Quantity = Quantity {
     most: 1.0,
     ..not_negative("part", "", "it is the part by which loosened soil expands, from 0 to 1: 0.1 to 0.3 for loam")
 };
-const STICK: Quantity = not_negative(
-    "height",
-    " m",
-    "it is the height of material that sticks to what leaves the ground, 0 or greater: 0.002 for damp sand",
-);
-const SHED: Quantity =
-    positive("time", " s", "it is the time within which 63 % of what sticks falls off: `shed 0.1` for example");
 const CELL: Quantity =
     positive("cell", "", "the width of a column is greater than 0, in units of the model: `cell 0.01`");
 const DEPTH: Quantity =
@@ -74,15 +68,15 @@ const RATE: Quantity =
 const RADIUS: Quantity = positive("radius", "", "the radius of the disc on which it falls is greater than 0");
 
 impl Builder<'_> {
-    pub(crate) fn soil(&mut self, name: &Name, attributes: &[Attribute], span: Span) {
+    pub(crate) fn soil(&mut self, name: &Name, (attributes, colors): (&[Attribute], &[Text]), span: Span) {
         const BASES: [(&str, SoilBase); 4] = [
             ("sand", SoilBase::Sand),
             ("mud", SoilBase::Mud),
             ("snow", SoilBase::Snow),
             ("soil", SoilBase::Soil),
         ];
-        const WORDS: [&str; 10] =
-            ["repose", "inner", "push", "rough", "flow", "cohesion", "weight", "swell", "stick", "shed"];
+        const WORDS: [&str; 8] =
+            ["repose", "inner", "push", "rough", "flow", "cohesion", "weight", "swell"];
         if let Some(before) = self.scenery.soils.iter().find(|soil| soil.name == name.text) {
             let twice = Diagnostic::error(format!("the soil `{}` is declared twice", name.text))
                 .at(name.span, "the second time")
@@ -111,22 +105,42 @@ impl Builder<'_> {
                     .help("keep one of them, and add values that differ: `soil wet = sand, repose 45`"),
             );
         }
-        let [repose, inner, push, rough, flow, cohesion, weight, swell, stick, shed] =
-            self.sorted(attributes, WORDS);
+        let [repose, inner, push, rough, flow, cohesion, weight, swell] = self.sorted(attributes, WORDS);
+        if let [first, second, ..] = colors {
+            self.scope.diagnostics.push(
+                Diagnostic::error("`color` is given twice")
+                    .at(second.span, "the second time")
+                    .at(first.span, "the first time")
+                    .help("keep one of them, and remove the other"),
+            );
+        }
+        let base = bases.first().map_or(SoilBase::default(), |(_, base)| *base);
+        let angles = [repose, inner].map(|part| part.map(|part| part.span));
+        let [repose, inner] = [self.attribute(repose, &REPOSE), self.attribute(inner, &INNER)];
+        if let (Some(least), Some(greatest)) = (repose, inner)
+            && greatest < least
+        {
+            let places = angles.map(|place| place.unwrap_or(span));
+            self.scope.diagnostics.push(
+                Diagnostic::error("pressed soil is less steep than loose soil")
+                    .at(places[1], format!("{} degrees where it is pressed", shown(greatest)))
+                    .at(places[0], format!("{} degrees where it is loose", shown(least)))
+                    .help("`inner` is the angle of repose of what a body has pressed: no less than `repose`"),
+            );
+        }
         // A soil with an error takes its name all the same; the model is refused then.
         let soil = Soil {
             name: name.text.clone(),
-            base: bases.first().map_or(SoilBase::default(), |(_, base)| *base),
-            repose: self.attribute(repose, &REPOSE),
-            inner: self.attribute(inner, &INNER),
+            base,
+            repose,
+            inner,
             push: self.attribute(push, &PUSH),
             rough: self.attribute(rough, &ROUGH),
             flow: self.attribute(flow, &FLOW),
             cohesion: self.attribute(cohesion, &COHESION),
             weight: self.attribute(weight, &WEIGHT),
             swell: self.attribute(swell, &SWELL),
-            stick: self.attribute(stick, &STICK),
-            shed: self.attribute(shed, &SHED),
+            color: colors.first().and_then(|text| color(text, self.scope)).unwrap_or(base.color()),
             span,
         };
         self.scenery.soils.push(soil);

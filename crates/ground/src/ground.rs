@@ -1,7 +1,7 @@
 //! The ground as a value: its columns at an instant, what they are, and how high they stand.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
 use crate::error::check;
 use crate::graph::Graph;
@@ -76,6 +76,8 @@ pub(crate) struct Setup {
     pub range: [i64; 2],
     /// Tiles in which the untouched surface is steeper than material can stand.
     pub steep: Vec<Key>,
+    /// Sizes of the squares of untouched tiles in a mesh, as far as there was one.
+    pub squares: Mutex<BTreeMap<Key, i32>>,
 }
 
 /// Sand, mud, snow or soil at an instant. Clones share their columns until one of them changes.
@@ -157,6 +159,7 @@ impl Ground {
             swell,
             range: [0; 2],
             steep: Vec::new(),
+            squares: Mutex::default(),
             description,
             settings,
         };

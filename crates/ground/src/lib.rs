@@ -70,6 +70,7 @@ mod clock;
 mod error;
 mod graph;
 mod ground;
+mod heap;
 mod kernel;
 mod load;
 mod material;

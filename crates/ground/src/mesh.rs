@@ -4,6 +4,7 @@
 //! around its middle.
 
 use std::collections::{BTreeMap, HashMap};
+use std::sync::PoisonError;
 
 use crate::tile::{Key, QUANTA};
 use crate::{Ground, Vector};
@@ -60,8 +61,17 @@ impl Ground {
 
     /// The largest size of squares that divides a tile and follows its surface.
     fn square_size(&self, key: Key) -> i32 {
-        let [x, z] = self.corners(key);
         let stored = (0..4).any(|n| self.tiles.contains_key(&(key.0 + n % 2, key.1 + n / 2)));
+        if stored {
+            return self.size_of(key, true);
+        }
+        // What falls everywhere does not change it.
+        let mut known = self.setup.squares.lock().unwrap_or_else(PoisonError::into_inner);
+        *known.entry(key).or_insert_with(|| self.size_of(key, false))
+    }
+
+    fn size_of(&self, key: Key, stored: bool) -> i32 {
+        let [x, z] = self.corners(key);
         let even = self.setup.description.bed.is_level() && self.setup.description.depth.is_level();
         let room = if stored { 0.0 } else { FLAT * QUANTA };
         let mut size = self.setup.side;

@@ -84,3 +84,10 @@ impl Model {
             || self.scenery.plants.iter().any(|plant| plant.is_random)
     }
 }
+
+impl Scenery {
+    /// The height of the ground at a place at the beginning, in units of the model, if there is one.
+    pub fn surface(&self, x: f64, z: f64) -> Option<f64> {
+        self.ground.or_else(|| self.bed.as_ref().map(|bed| bed.surface(x, z)))
+    }
+}

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::Rgb;
 use dlsys_diagnostic::Span;
 use dlsys_expr::Program;
 
@@ -28,10 +29,8 @@ pub struct Soil {
     pub weight: Option<f64>,
     /// The part by which loosened soil expands.
     pub swell: Option<f64>,
-    /// The height of material that sticks to what leaves the ground, in m.
-    pub stick: Option<f64>,
-    /// The time constant with which that is shed, in s.
-    pub shed: Option<f64>,
+    /// Its colour.
+    pub color: Rgb,
     /// The place of the declaration in the text.
     pub span: Span,
 }
@@ -48,6 +47,18 @@ pub enum SoilBase {
     Snow,
     /// `soil`
     Soil,
+}
+
+impl SoilBase {
+    /// The colour of a soil that begins from it, unless the text gives another one.
+    pub const fn color(self) -> Rgb {
+        match self {
+            SoilBase::Sand => 0xd9bf8c,
+            SoilBase::Mud => 0x7a6248,
+            SoilBase::Snow => 0xf6f9fd,
+            SoilBase::Soil => 0x8a6a4a,
+        }
+    }
 }
 
 /// `ground SOIL cell D depth H height f(x, z) extent E`, in units of the model.
@@ -68,6 +79,12 @@ pub struct Bed {
 }
 
 impl Bed {
+    /// The height of the surface at the beginning, at a place; beyond the edges that at the nearest edge.
+    pub fn surface(&self, x: f64, z: f64) -> f64 {
+        let inside = |at: f64| at.clamp(-self.extent, self.extent);
+        self.height.at(inside(x), inside(z), self.extent)
+    }
+
     /// Half the number of columns on a side, if the text gives no extent.
     pub const CELLS: f64 = 500.0;
     /// The largest number of columns on a side.
@@ -84,6 +101,14 @@ pub enum Relief {
 }
 
 impl Relief {
+    /// The height, if it is the same everywhere.
+    pub fn level(&self) -> Option<f64> {
+        match self {
+            Relief::Function(program) if program.reads().is_empty() => Some(program.eval_one(&[0.0; 2])),
+            _ => None,
+        }
+    }
+
     /// The height at a place, where the ground extends from `-extent` to `extent`.
     pub fn at(&self, x: f64, z: f64, extent: f64) -> f64 {
         match self {

@@ -382,7 +382,9 @@ impl Triangles {
             _ => true,
         });
         solid.faces(&items, &mut mesh, |mesh, owner, material, segment| {
-            (mesh.owner, mesh.material, mesh.is_thin) = (owner, material, segment.is_none());
+            // No light comes through the ground.
+            let is_thin = segment.is_none() && Some(owner) != solid.scene.terrain;
+            (mesh.owner, mesh.material, mesh.is_thin) = (owner, material, is_thin);
             mesh.surface += 1;
             mesh.segments.push(segment.map(|segment| segment as u32));
         });

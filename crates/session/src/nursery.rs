@@ -17,11 +17,11 @@ use crate::looks::Sight;
 use crate::swaying::{Around, SwayReport, Swaying, sways};
 use crate::threads;
 use dlsys_diagnostic::Diagnostic;
-use dlsys_geometry::scene::{Bounds, Plant, Scene, Seedling, Width};
+use dlsys_geometry::scene::{Bounds, Color, MaterialId, Plant, Scene, Seedling, Width};
 use dlsys_geometry::turtle::{self, Strains};
 use dlsys_model::{self as model, Model};
 use dlsys_sim::{self as sim, Settings, Simulation, brief};
-use dlsys_surround::{self as surround, Classes, Gases, Motion, Passive as Following, Place, Weather};
+use dlsys_surround::{self as surround, Classes, Gases, Motion, Passive as Following, Place, Terrain, Weather};
 use dlsys_tree::ModuleString;
 
 /// Most simulations that are kept from one scene to the next.
@@ -98,6 +98,9 @@ pub struct Nursery<'m> {
     /// Threads for the plants of one scene.
     threads: usize,
     has_gases: bool,
+    has_ground: bool,
+    /// The material of ground that gives way.
+    earth: MaterialId,
 }
 
 /// What is passive in a scene.
@@ -105,13 +108,19 @@ struct Passive<'m> {
     around: Around<'m>,
     motion: Option<Motion<'m>>,
     gases: Option<Gases<'m>>,
+    terrain: Option<Terrain<'m>>,
 }
 
 impl<'m> Nursery<'m> {
     /// For a model and its runs with these settings.
     pub fn new(model: &'m Model, settings: Settings) -> Nursery<'m> {
         let settings = Settings { log: false, ..settings };
-        Nursery::with_blanks(model, settings, &mut turtle::blanks(model).into_iter())
+        let mut nursery = Nursery::with_blanks(model, settings, &mut turtle::blanks(model).into_iter());
+        if let Some(bed) = &model.scenery.bed {
+            let color = Color::hex(model.scenery.soils[bed.soil].color);
+            nursery.earth = nursery.blank.palette.add("ground", color);
+        }
+        nursery
     }
 
     /// The blank scenes are those of the model, of its plants, and of theirs, in the order of [`turtle::blanks`].
@@ -135,6 +144,8 @@ impl<'m> Nursery<'m> {
             gauge: OnceLock::new(),
             threads: 1,
             has_gases: true,
+            has_ground: true,
+            earth: MaterialId::LEAF,
         }
     }
 
@@ -146,6 +157,11 @@ impl<'m> Nursery<'m> {
     /// Without blobs of gases, which then cost nothing.
     pub fn without_gases(self) -> Nursery<'m> {
         Nursery { has_gases: false, ..self }
+    }
+
+    /// Without the surface of ground that gives way, which then costs nothing.
+    pub fn without_ground(self) -> Nursery<'m> {
+        Nursery { has_ground: false, ..self }
     }
 
     /// For pictures of this size, in which plants that are small move by the modes of their class, with an error below its bound, and plants that
@@ -175,11 +191,15 @@ impl<'m> Nursery<'m> {
     /// # Errors
     /// A module that cannot be drawn, or a plant whose run or drawing fails.
     pub fn draw(&self, string: &ModuleString, scene: &mut Scene) -> Result<(), DrawError> {
-        let Passive { around, motion, gases } = self.passive()?;
+        let Passive { around, motion, gases, terrain } = self.passive()?;
         // They read the motion of stems at ticks before.
         let gases = match gases {
             Some(gases) => gases.at(string.time, motion.as_ref())?,
             None => Vec::new(),
+        };
+        let ground = match terrain {
+            Some(terrain) => Some(terrain.at(string.time, self.earth, motion.as_ref())?),
+            None => None,
         };
         let bent = match motion {
             Some(motion) => Some(motion.at(string)?),
@@ -188,6 +208,9 @@ impl<'m> Nursery<'m> {
         let strains = bent.as_ref().map(|bent| bent as &dyn Strains);
         self.draw_with((self.settings.seed, around), string, strains, scene)?;
         scene.gases = gases;
+        if let Some(ground) = ground {
+            scene.add_terrain(ground);
+        }
         Ok(())
     }
 
@@ -204,7 +227,11 @@ impl<'m> Nursery<'m> {
                 true => Gases::new(model, self.settings, weather, self.threads)?,
                 false => None,
             };
-            Ok(Passive { around, motion, gases })
+            let terrain = match self.has_ground {
+                true => Terrain::new(model, self.settings, self.threads)?,
+                false => None,
+            };
+            Ok(Passive { around, motion, gases, terrain })
         };
         self.passive.get_or_init(start).as_ref().map_err(Clone::clone)
     }

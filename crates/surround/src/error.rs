@@ -4,6 +4,7 @@ use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_fall as fall;
 use dlsys_gas as gas;
 use dlsys_geometry::turtle;
+use dlsys_ground as ground;
 use dlsys_model::Model;
 use dlsys_sim::{self as sim, brief};
 use dlsys_sway as sway;
@@ -140,6 +141,28 @@ pub enum Error {
         /// The strongest source, or the declaration.
         span: Span,
     },
+    /// The ground cannot be followed.
+    #[error("{}", pressing(.error, *.time, *.metre))]
+    Ground {
+        /// The reason, in m.
+        error: ground::Error,
+        /// The time in units of the model.
+        time: f64,
+        /// A unit of length of the model in m.
+        metre: f64,
+        /// The body, what is poured, or the ground.
+        span: Span,
+    },
+    /// What is poured has no rate or no place.
+    #[error("what is poured has the rate {rate} at t = {time}")]
+    Pour {
+        /// The rate in units of the model.
+        rate: f64,
+        /// The time in units of the model.
+        time: f64,
+        /// The declaration.
+        span: Span,
+    },
     /// Too many parts are let go.
     #[error("more than {most} parts are let go up to t = {time}")]
     TooManyParts {
@@ -271,6 +294,17 @@ impl Error {
                     _ => "declared here",
                 })
                 .help("look at its values in `units`, and at the speed of the wind"),
+            Error::Ground { error, span, .. } => {
+                let (label, help) = help_on_ground(error);
+                Diagnostic::error(self.to_string()).at(*span, label).help(help)
+            }
+            Error::Pour { rate, time, span } => Diagnostic::error(format!(
+                "what is poured has the rate {} at t = {}",
+                brief(*rate, 6),
+                brief(*time, 8)
+            ))
+            .at(*span, "it follows t, and so may its place")
+            .help("a rate is a finite number and 0 or greater at all times, and its place has finite coordinates: `if t < 3 then 0.5 else 0`"),
             Error::TooManyParts { most, span, .. } => {
                 let diagnostic = Diagnostic::error(self.to_string());
                 let diagnostic = match span {
@@ -292,7 +326,7 @@ impl Error {
             .at(
                 *span,
                 format!(
-                    "this is followed in steps of a thirtieth of a second, and a unit of t is {seconds} s"
+                    "this is followed in steps of a thirtieth of a second or less, and a unit of t is {seconds} s"
                 ),
             )
             .help("`units time S` is the pace of the film: seconds of motion in a unit of t, such as 1"),
@@ -340,6 +374,70 @@ fn bending(error: &sway::Error, stem: Option<&FailedStem>, time: f64) -> String 
         format!("the stem of `{kind}` (module {lineage})")
     });
     format!("{stem} cannot be followed at t = {}: {why}", brief(time, 8))
+}
+
+/// The failure of a ground as a message, with lengths in units of the model, each of so many metres.
+fn pressing(error: &ground::Error, time: f64, metre: f64) -> String {
+    let time = brief(time, 8);
+    let at = |[x, z]: [f64; 2]| format!("({}, {})", brief(x / metre, 4), brief(z / metre, 4));
+    match error {
+        ground::Error::Open { name, at: place } => {
+            let place = at(*place);
+            format!("the surface of `{name}` is not closed at t = {time}: above and below (x, z) = {place}, it is entered and left unequally often")
+        }
+        ground::Error::Outside { name, at: place } if name == "a pour" => {
+            format!("what is poured at (x, z) = {} falls beside the ground at t = {time}", at(*place))
+        }
+        ground::Error::Outside { name, at: place } => {
+            format!("`{name}` reaches (x, z) = {} at t = {time}, where there is no ground", at(*place))
+        }
+        ground::Error::Body { name, fault } => format!("`{name}` {fault} at t = {time}"),
+        ground::Error::Fast { name, way, most, .. } => format!(
+            "`{name}` moves {} in a {}th of a second at t = {time}: the most is {} here",
+            brief(way / metre, 4),
+            crate::GROUND_TICKS,
+            brief(most / metre, 4)
+        ),
+        ground::Error::Height { name, value, most, .. } => format!(
+            "{name} is {} high at t = {time}: the most is {} here",
+            brief(value / metre, 4),
+            brief(most / metre, 4)
+        ),
+        ground::Error::Memory { most, at: place } => format!(
+            "the ground that has been touched needs more than {most} MB at t = {time}, around (x, z) = {}",
+            at(*place)
+        ),
+        error => format!("this ground cannot be followed: {error}"),
+    }
+}
+
+/// What stands at the place of a failure of a ground, and what helps.
+fn help_on_ground(error: &ground::Error) -> (&'static str, &'static str) {
+    match error {
+        ground::Error::Open { .. } => (
+            "declared here",
+            "a body is a closed mesh, or several; a leaf or a plate, which only carries what falls on it, is a `shelf`",
+        ),
+        ground::Error::Outside { .. } => {
+            ("declared here", "the ground goes from -E to E in x and z: `extent E` makes it larger")
+        }
+        ground::Error::Body { .. } => ("declared here", "look at its size in `units`, and at the width of a `cell`"),
+        ground::Error::Fast { .. } => (
+            "declared here",
+            "`units time S` is the pace of the film: S seconds in a unit of t; a larger `cell` allows longer ways",
+        ),
+        ground::Error::Height { .. } => {
+            ("declared here", "heights are within 65,536 cells: look at the `rate`, at the `height`, and at the `cell`")
+        }
+        ground::Error::Memory { .. } => {
+            ("declared here", "a larger `cell` needs less memory, and so does a smaller place that is touched or poured on")
+        }
+        ground::Error::Value { name, .. } if name.contains("sweeps") => (
+            "declared here",
+            "a larger `cell` needs fewer of them, and so does a smaller `flow` of the soil",
+        ),
+        _ => ("declared here", "look at the values of its soil, and at its `cell` and `extent` in `units`"),
+    }
 }
 
 /// The failure of a flight as a message.

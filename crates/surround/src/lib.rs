@@ -1,4 +1,4 @@
-//! The surroundings of a growing plant: wind, the stems that bend in it, what is let go and falls, and gases.
+//! The surroundings of a growing plant: wind, the stems that bend in it, what is let go and falls, gases, and ground that gives way.
 //!
 //! ```text
 //! growth (sim) ──string──▶ turtle ──skeleton──▶ body ──▶ stems in the wind (sway, wind) ──strains──▶ turtle ──▶ scene
@@ -14,6 +14,7 @@
 //! - [`Classes`]: modes by which plants move that are small in the picture.
 //! - [`Gases`]: smoke, steam and pollen at any time.
 //! - [`Loose`]: what is let go, as a body.
+//! - [`Terrain`]: ground that gives way, at any time.
 //! - [`Motion`]: the stems and the flights of a model at any time, as [`BentStems`] for [`draw_bent`](dlsys_geometry::turtle::draw_bent).
 
 #![warn(missing_docs)]
@@ -33,8 +34,10 @@ mod motion;
 mod outlets;
 mod place;
 mod points;
+mod pressing;
 mod solids;
 mod survey;
+mod terrain;
 mod weather;
 
 pub use bending::{BentStems, Effort};
@@ -45,6 +48,7 @@ pub use gases::{Gases, MOST_BLOBS, TICK as GAS_TICK};
 pub use loose::Loose;
 pub use motion::{MOST_TICKS, Motion, Passive};
 pub use place::Place;
+pub use terrain::{TICKS as GROUND_TICKS, Terrain, TerrainReport};
 pub use survey::{Axis, Survey, Vibration, moves};
 pub use weather::{Sampler, Weather};
 

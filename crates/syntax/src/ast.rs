@@ -348,6 +348,8 @@ pub enum Item {
         name: Name,
         /// Its parts, in the order written; one without a value is the material that it begins from.
         attributes: Vec<Attribute>,
+        /// Its colours, as `#rrggbb` or `#rgb`: more than one is an error.
+        colors: Vec<Text>,
     },
     /// `ground soil cell d depth h height f(x, z) extent e`: ground that gives way.
     Bed {

@@ -352,7 +352,7 @@ pub static DECLARATIONS: [Declaration; 34] = [
     },
     Declaration {
         usage: "NAME …",
-        summary: "modules whose drawings are solid bodies: they push the wind aside",
+        summary: "modules whose drawings are solid bodies: they push the wind aside, and press into the ground",
         category: Category::Scene,
         repeats: Repeats::Freely,
         body: Body::Names,
@@ -389,8 +389,7 @@ pub static DECLARATIONS: [Declaration; 34] = [
             option("cohesion", Follow::Value),
             option("weight", Follow::Value),
             option("swell", Follow::Value),
-            option("stick", Follow::Value),
-            option("shed", Follow::Value),
+            option("color", Follow::Text),
         ],
         begins: Begins::BeforeValue,
         written: "a soil is written `soil powder = snow, repose 50`",

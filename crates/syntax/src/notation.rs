@@ -86,7 +86,11 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
         }
         Rule::solid_item => Item::Solid(parts.names()),
         Rule::shelf_item => Item::Shelf(parts.names()),
-        Rule::soil_item => Item::Soil { name: parts.name(), attributes: parts.attributes()? },
+        Rule::soil_item => {
+            let name = parts.name();
+            let (attributes, colors) = parts.values_and_colors()?;
+            Item::Soil { name, attributes, colors }
+        }
         Rule::pour_item => Item::Pour { soil: parts.name(), attributes: parts.attributes()? },
         Rule::ignore_item => Item::Ignore(parts.names()),
         Rule::consider_item => Item::Consider(parts.names()),
@@ -178,15 +182,12 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
             format!("tissue {} = {}", name.text, written(expressions, attributes, ", "))
         }
         Item::Gas { name, attributes, colors } => {
-            let values = attributes.iter().map(|one| attribute(expressions, one));
-            let all: Vec<String> =
-                values.chain(colors.iter().map(|color| format!("color \"{}\"", color.text))).collect();
-            format!("gas {} = {}", name.text, all.join(", "))
+            format!("gas {} = {}", name.text, colored(expressions, attributes, colors))
         }
         Item::Solid(list) => format!("solid {}", print::names(list, " ")),
         Item::Shelf(list) => format!("shelf {}", print::names(list, " ")),
-        Item::Soil { name, attributes } => {
-            format!("soil {} = {}", name.text, written(expressions, attributes, ", "))
+        Item::Soil { name, attributes, colors } => {
+            format!("soil {} = {}", name.text, colored(expressions, attributes, colors))
         }
         Item::Bed { soil, file, attributes } => {
             let from = file.as_ref().map(|file| format!("from \"{}\"", file.text));
@@ -365,6 +366,13 @@ fn attribute(expressions: &Expressions, Attribute { word, choice, values, .. }: 
     let values: Vec<String> = values.iter().map(|x| print::expression(expressions, x.root)).collect();
     let values = (!values.is_empty()).then(|| values.join(", "));
     words.chain(values).collect::<Vec<_>>().join(" ")
+}
+
+/// Values, and the colours behind them.
+fn colored(expressions: &Expressions, attributes: &[Attribute], colors: &[Text]) -> String {
+    let values = attributes.iter().map(|one| attribute(expressions, one));
+    let colors = colors.iter().map(|color| format!("color \"{}\"", color.text));
+    values.chain(colors).collect::<Vec<_>>().join(", ")
 }
 
 fn written(expressions: &Expressions, attributes: &[Attribute], separator: &str) -> String {

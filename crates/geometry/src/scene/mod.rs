@@ -141,6 +141,8 @@ pub struct Scene {
     pub sources: Vec<GasSource>,
     /// The gases of the model with their blobs, in the order of their declarations; empty if they are not followed.
     pub gases: Vec<Gas>,
+    /// The owner of the surface that is ground of soil, if there is one. It is seen in every frame; framing ignores it.
+    pub terrain: Option<OwnerId>,
     /// Plants of other models that are to be drawn, in string order; empty once they are among `plants`.
     pub seedlings: Vec<Seedling>,
     /// Plants of other models, in string order.
@@ -182,6 +184,7 @@ impl Scene {
         self.patches.clear();
         self.sources.clear();
         self.gases.clear();
+        self.terrain = None;
         self.seedlings.clear();
         self.plants.clear();
         self.surroundings = Surroundings::default();
@@ -300,7 +303,7 @@ impl Scene {
         }
         let vertices = self.polygons.iter().flat_map(|polygon| polygon.vertices.iter().copied());
         vertices.for_each(|point| reach.include(point, Width::Set(0.0)));
-        for surface in &self.surfaces {
+        for surface in self.surfaces.iter().filter(|surface| Some(surface.owner) != self.terrain) {
             let corners = surface.mesh.bounds().map(|bounds| surface.placement.corners(bounds));
             if corners.is_some_and(|corners| reach.covers(corners.into_iter())) {
                 continue;
@@ -327,6 +330,15 @@ impl Scene {
     pub fn add_owner(&mut self, owner: Owner) -> OwnerId {
         self.owners.push(owner);
         OwnerId((self.owners.len() - 1) as u32)
+    }
+
+    /// Adds ground of soil: a mesh in scene units.
+    pub fn add_terrain(&mut self, mesh: Arc<Mesh>) {
+        let owner = self.add_owner(Owner { name: "=ground".into(), lineage: Lineage::of_axiom(0) });
+        let axes = [Vector::x(), Vector::y(), Vector::z()];
+        let placement = Placement::uniform(Point::origin(), axes, 1.0);
+        self.surfaces.push(Surface { mesh, patches: None, placement, tint: None, owner });
+        self.terrain = Some(owner);
     }
 
     /// The module with a number of this scene.

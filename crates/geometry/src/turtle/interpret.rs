@@ -3,6 +3,7 @@
 //! The nesting of interpretations is kept on a stack of its own, and their modules and arguments in one array each, so that
 //! depth costs memory by the level and nothing by the module.
 
+use super::body::DrawnBody;
 use super::command::Command;
 use super::free::{FreePart, SolidBody};
 use super::prepare::prepare;
@@ -94,6 +95,25 @@ pub(super) fn solids(
     let mut walk = Walk::new(model, scene, string.time).recording_solids();
     run(model, string, &mut walk)?;
     Ok(walk.solids())
+}
+
+/// See [`super::bodies`].
+pub(super) fn bodies(
+    model: &Model,
+    string: &ModuleString,
+    strains: Option<&dyn Strains>,
+    accuracy: f64,
+    scene: &mut Scene,
+) -> Result<Vec<DrawnBody>, Error> {
+    scene.clear();
+    prepare(model, scene);
+    let mut walk = Walk::new(model, scene, string.time);
+    if let Some(strains) = strains {
+        walk = walk.bending(strains);
+    }
+    let mut walk = walk.recording_bodies();
+    run(model, string, &mut walk)?;
+    Ok(walk.bodies(accuracy))
 }
 
 fn begin(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<(), Error> {

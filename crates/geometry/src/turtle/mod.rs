@@ -54,6 +54,7 @@
 
 mod bend;
 mod bent;
+mod body;
 mod command;
 mod error;
 mod frame;
@@ -73,6 +74,7 @@ mod organ_tests;
 mod tests;
 
 use crate::scene::{Point, Scene, Vector};
+pub use body::DrawnBody;
 pub use bent::{PartKey, StemKey, Strains};
 use command::Command;
 use dlsys_diagnostic::Span;
@@ -183,6 +185,21 @@ pub fn free_parts(
 /// As of [`draw`].
 pub fn solids(model: &Model, string: &ModuleString, scene: &mut Scene) -> Result<Vec<SolidBody>, Error> {
     interpret::solids(model, string, scene)
+}
+
+/// The bodies and shelves of a string: what each of its modules that are `solid` or `shelf` draws, as triangles, with stems bent by these strains, if any.
+/// Patches are within `accuracy` of theirs, in scene units. `scene` is overwritten.
+///
+/// # Errors
+/// As of [`draw`].
+pub fn bodies(
+    model: &Model,
+    string: &ModuleString,
+    strains: Option<&dyn Strains>,
+    accuracy: f64,
+    scene: &mut Scene,
+) -> Result<Vec<DrawnBody>, Error> {
+    interpret::bodies(model, string, strains, accuracy, scene)
 }
 
 /// The kinds of a model that hold an `@D`, themselves or in what they are drawn as, by [`KindId::index`].

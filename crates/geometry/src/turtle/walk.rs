@@ -7,6 +7,7 @@ mod width;
 use std::sync::Arc;
 
 use super::bent::{Bent, Strains};
+use super::body::{self, DrawnBody};
 use super::command::Command;
 use super::error::{self, Error, ErrorKind, Remark, Remarks};
 use super::frame::{Axis, Frame};
@@ -180,6 +181,18 @@ impl<'a> Walk<'a> {
             solid_kinds[kind.index()] = true;
         }
         Walk { recorder: Some(Recorder { solid_kinds, ..Recorder::default() }), ..self }
+    }
+
+    /// Notes the bodies and the shelves among what is drawn; the scene must be empty.
+    pub(super) fn recording_bodies(self) -> Walk<'a> {
+        let solid_kinds = body::kinds(self.model);
+        Walk { recorder: Some(Recorder { solid_kinds, ..Recorder::default() }), ..self }
+    }
+
+    /// The bodies and the shelves with their triangles, if they were noted.
+    pub(super) fn bodies(self, accuracy: f64) -> Vec<DrawnBody> {
+        let Walk { recorder, scene, model, .. } = self;
+        recorder.map_or_else(Vec::new, |recorder| recorder.finish_bodies(scene, model, accuracy))
     }
 
     /// The bodies, if they were noted.

@@ -178,17 +178,18 @@ impl Walk<'_> {
 
     /// Moves to the ground below or above, without a vertex of a polygon.
     pub(super) fn set_down(&mut self) {
-        let Some(height) = self.model.scenery.ground else { return };
+        let scenery = &self.model.scenery;
         if let Some(bent) = self.state.bent {
             // Below the place where the turtle is seen, which is then also its place at rest.
             let mut there = bent.point(self.state.position);
+            let Some(height) = scenery.surface(there.x, there.z) else { return };
             there.y = height;
             self.state.bent = Some(bent.put(there, there));
             (self.state.position, self.state.remainder) = (there, Vector::zeros());
-        } else if height != self.state.position.y {
-            (self.state.position.y, self.state.remainder.y) = (height, 0.0);
         } else {
-            return;
+            let at = self.state.position;
+            let Some(height) = scenery.surface(at.x, at.z).filter(|height| *height != at.y) else { return };
+            (self.state.position.y, self.state.remainder.y) = (height, 0.0);
         }
         (self.state.last, self.state.joined) = (None, None);
     }

@@ -1,0 +1,442 @@
+//! Ground that gives way, at any time of a model: the same bits whatever is asked for, in whatever order.
+//!
+//! ```text
+//! growth ──string at each tick──▶ turtle, stems as they bend ──bodies, shelves──▶ columns ──▶ mesh at a tick
+//! ```
+//!
+//! What is seen at a time is the ground at the tick at or before it. Where nothing can touch it any more, ticks pass at no cost.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use dlsys_diagnostic::Span;
+use dlsys_geometry::scene::{self, MaterialId, Point, Scene};
+use dlsys_geometry::turtle;
+use dlsys_ground::{self as ground, Description, Extent, Ground};
+use dlsys_model::{Bed, Model, Soil, SoilBase};
+use dlsys_sim::{Settings, Simulation};
+use dlsys_tree::ModuleString;
+
+use crate::Error;
+use crate::coupled;
+use crate::descent::Descent;
+use crate::motion::{MOST_TICKS, Motion};
+use crate::place::Place;
+use crate::pressing::{Placed, placed};
+
+/// Ticks of the ground in a second.
+pub const TICKS: f64 = 120.0;
+/// A time that is short of a tick by this part of one counts as the tick: a rounding of frames of 24, 30, or 60 in a second.
+const SLACK: f64 = 1e-6;
+/// Height of the soil above what does not give way, in columns, where the text gives no `depth`.
+const DEEP: f64 = 10_000.0;
+/// Memory for columns that have been touched, in MB.
+const MEMORY: usize = 1024;
+/// Most columns of the moments that are kept because they were asked for, and of marks.
+const MOST_KEPT: usize = 4_000_000;
+/// Largest number of marks, and the first distance between them, in ticks.
+const MOST_MARKS: usize = 24;
+const FIRST_SPACING: u64 = 64;
+/// Patches of bodies are as near to theirs as this part of a column.
+const ACCURACY: f64 = 0.1;
+
+/// The ground of a model.
+pub struct Terrain<'m> {
+    model: &'m Model,
+    settings: Settings,
+    place: Place,
+    /// Some module may draw a body or a shelf.
+    has_bodies: bool,
+    state: Mutex<State<'m>>,
+}
+
+/// The ground at a tick, and the bodies there.
+#[derive(Clone)]
+pub(crate) struct Moment {
+    number: u64,
+    ground: Ground,
+    bodies: Arc<Vec<Placed>>,
+}
+
+/// A moment to go on from.
+#[derive(Clone)]
+struct Course<'m> {
+    growth: Simulation<'m>,
+    moment: Moment,
+}
+
+struct State<'m> {
+    start: Course<'m>,
+    /// The bodies of the start are known.
+    has_begun: bool,
+    present: Option<Course<'m>>,
+    /// Moments that were asked for, with the columns that each does not share with the one before.
+    kept: BTreeMap<u64, (Moment, usize)>,
+    marks: Vec<Course<'m>>,
+    spacing: u64,
+    spent: Duration,
+    scene: Scene,
+    /// The last mesh, and its tick.
+    mesh: Option<(u64, MaterialId, Arc<scene::Mesh>)>,
+}
+
+/// What the columns of a ground are doing at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TerrainReport {
+    /// Ticks from the beginning.
+    pub ticks: u64,
+    /// Columns in memory.
+    pub columns: usize,
+    /// Sweeps over columns so far, and columns that they computed.
+    pub sweeps: u64,
+    /// See `sweeps`.
+    pub updates: u64,
+    /// What columns, loads and what is compressed have gained less what was poured, in parts of quanta: always 0.
+    pub imbalance: i128,
+    /// Volume that lies on bodies, in m³.
+    pub carried: f64,
+    /// Nothing slips.
+    pub is_at_rest: bool,
+}
+
+impl<'m> Terrain<'m> {
+    /// The ground of the model of a scene; `None` if none is declared that gives way. Results do not depend on the number of threads.
+    ///
+    /// # Errors
+    /// A ground whose values are out of range.
+    pub fn new(model: &'m Model, settings: Settings, threads: usize) -> Result<Option<Terrain<'m>>, Error> {
+        let Some(bed) = &model.scenery.bed else { return Ok(None) };
+        let place = Place::of_scene(&model.scenery);
+        let settings = Settings { log: true, transitions: false, ..settings };
+        let description = describe(bed, &model.scenery.soils[bed.soil], place.units.length);
+        let of_ground = ground::Settings {
+            tick: 1.0 / TICKS,
+            threads: threads.clamp(1, 1024),
+            memory: MEMORY,
+            ..ground::Settings::default()
+        };
+        let ground = Ground::new(description, of_ground)
+            .map_err(|error| Error::Ground { error, time: 0.0, metre: place.units.length, span: bed.span })?;
+        let growth = coupled::start(model, settings, place)?;
+        let moment = Moment { number: 0, ground, bodies: Arc::default() };
+        let state = State {
+            start: Course { growth, moment },
+            has_begun: false,
+            present: None,
+            kept: BTreeMap::new(),
+            marks: Vec::new(),
+            spacing: FIRST_SPACING,
+            spent: Duration::ZERO,
+            scene: turtle::blank(model),
+            mesh: None,
+        };
+        let has_bodies = !model.scenery.solids.is_empty() || !model.scenery.shelves.is_empty();
+        Ok(Some(Terrain { model, settings, place, has_bodies, state: Mutex::new(state) }))
+    }
+
+    /// The surface of the ground, and of what lies on bodies, at a time of the model, in its units, of a material. Stems move as they do here.
+    ///
+    /// # Errors
+    /// The growth up to that time fails, or the motion of its stems; a body or what is poured is not possible, or there is too much of it.
+    pub fn at(
+        &self,
+        time: f64,
+        material: MaterialId,
+        motion: Option<&Motion<'m>>,
+    ) -> Result<Arc<scene::Mesh>, Error> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let moment = self.reach(&mut state, time, motion)?;
+        if let Some((number, of, mesh)) = &state.mesh
+            && (*number, *of) == (moment.number, material)
+        {
+            return Ok(Arc::clone(mesh));
+        }
+        let mesh = Arc::new(self.mesh(&moment.ground, material));
+        state.mesh = Some((moment.number, material, Arc::clone(&mesh)));
+        Ok(mesh)
+    }
+
+    /// The height of the surface at a time and a place of the model.
+    ///
+    /// # Errors
+    /// As of [`Terrain::at`].
+    pub fn height(&self, time: f64, [x, z]: [f64; 2], motion: Option<&Motion<'m>>) -> Result<f64, Error> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let moment = self.reach(&mut state, time, motion)?;
+        let metre = self.place.units.length;
+        Ok(moment.ground.height(x * metre, z * metre) / metre)
+    }
+
+    /// Counts and volumes at a time of the model.
+    ///
+    /// # Errors
+    /// As of [`Terrain::at`].
+    pub fn report(&self, time: f64, motion: Option<&Motion<'m>>) -> Result<TerrainReport, Error> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let Moment { number, ground, .. } = self.reach(&mut state, time, motion)?;
+        Ok(TerrainReport {
+            ticks: number,
+            columns: ground.stored(),
+            sweeps: ground.sweeps(),
+            updates: ground.updates(),
+            imbalance: ground.imbalance(),
+            carried: ground.carried(),
+            is_at_rest: ground.is_at_rest(),
+        })
+    }
+
+    /// The ground at the tick at or before a time of the model.
+    fn reach(&self, state: &mut State<'m>, time: f64, motion: Option<&Motion<'m>>) -> Result<Moment, Error> {
+        let number = (self.place.seconds(time).max(0.0) * TICKS + SLACK).floor();
+        if number > MOST_TICKS {
+            let seconds = self.place.units.time;
+            return Err(Error::TooLong { most: MOST_TICKS, time, seconds, span: self.span() });
+        }
+        let begun = Instant::now();
+        let (limit, spent) = (self.settings.max_seconds, state.spent);
+        let in_time = |at: f64| match (spent + begun.elapsed()).as_secs_f64() > limit {
+            true => Err(Error::OutOfTime { limit, time: at, span: self.span() }),
+            false => Ok(()),
+        };
+        let moment = self.moment(state, number as u64, motion, &in_time);
+        state.spent += begun.elapsed();
+        moment
+    }
+
+    fn moment(
+        &self,
+        state: &mut State<'m>,
+        number: u64,
+        motion: Option<&Motion<'m>>,
+        in_time: &dyn Fn(f64) -> Result<(), Error>,
+    ) -> Result<Moment, Error> {
+        if let Some((moment, _)) = state.kept.get(&number) {
+            return Ok(moment.clone());
+        }
+        if !state.has_begun {
+            let mut course = state.start.clone();
+            if self.has_bodies {
+                let mut string = ModuleString::default();
+                course.growth.at(self.time_of(0), &mut string)?;
+                course.growth.take_events();
+                course.moment.bodies = Arc::new(self.bodies(&string, &[], &Descent::default(), state, motion)?);
+            }
+            (state.start, state.has_begun) = (course, true);
+        }
+        let mut present = match state.present.take() {
+            Some(present) if present.moment.number <= number => present,
+            _ => {
+                let mark = state.marks.iter().rev().find(|mark| mark.moment.number <= number);
+                mark.unwrap_or(&state.start).clone()
+            }
+        };
+        while present.moment.number < number {
+            in_time(self.time_of(present.moment.number))?;
+            if !self.has_bodies && self.model.scenery.pours.is_empty() && present.moment.ground.is_at_rest() {
+                present.moment.number = number;
+                break;
+            }
+            self.tick(&mut present, state, motion)?;
+            mark(&present, state);
+        }
+        let moment = present.moment.clone();
+        state.present = Some(present);
+        keep(&moment, state);
+        Ok(moment)
+    }
+
+    /// Goes on to the next tick.
+    fn tick(
+        &self,
+        course: &mut Course<'m>,
+        state: &mut State<'m>,
+        motion: Option<&Motion<'m>>,
+    ) -> Result<(), Error> {
+        let next = course.moment.number + 1;
+        let mut bodies = Vec::new();
+        if self.has_bodies {
+            let mut string = ModuleString::default();
+            course.growth.at(self.time_of(next), &mut string)?;
+            let mut descent = Descent::default();
+            descent.add(self.model, &course.growth.take_events());
+            bodies = self.bodies(&string, &course.moment.bodies, &descent, state, motion)?;
+        }
+        let pours = self.pours(next)?;
+        let moving: Vec<ground::Body> = bodies.iter().map(Placed::moving).collect();
+        let done = course.moment.ground.advance(&pours, &moving);
+        done.map_err(|error| self.failed(error, self.time_of(next)))?;
+        course.moment.bodies = Arc::new(bodies);
+        course.moment.number = next;
+        Ok(())
+    }
+
+    /// The bodies of a string, each with its place in that of the tick before.
+    fn bodies(
+        &self,
+        string: &ModuleString,
+        past: &[Placed],
+        descent: &Descent,
+        state: &mut State<'m>,
+        motion: Option<&Motion<'m>>,
+    ) -> Result<Vec<Placed>, Error> {
+        let scenery = &self.model.scenery;
+        let counts = |kind| scenery.solids.iter().chain(&scenery.shelves).any(|(own, _)| *own == kind);
+        if !string.iter().any(|module| counts(module.kind)) {
+            return Ok(Vec::new());
+        }
+        let bent = motion.map(|motion| motion.at(string)).transpose()?;
+        let strains = bent.as_ref().map(|bent| bent as &dyn turtle::Strains);
+        let cell = scenery.bed.as_ref().map_or(1.0, |bed| bed.cell);
+        let drawn = turtle::bodies(self.model, string, strains, ACCURACY * cell, &mut state.scene)?;
+        let name = |body: &turtle::DrawnBody| self.model.kinds.get(body.origin.kind).name.clone();
+        Ok(placed(drawn, past, descent, self.place.units.length, name))
+    }
+
+    /// What is poured up to a tick, at the rates and places of the middle of its time.
+    fn pours(&self, next: u64) -> Result<Vec<ground::Pour>, Error> {
+        let metre = self.place.units.length;
+        let time = self.place.time_at((next as f64 - 0.5) / TICKS);
+        let mut pours = Vec::new();
+        for (number, pour) in self.model.scenery.pours.iter().enumerate() {
+            let rate = pour.rate.eval_one(&[time]) / self.place.units.time;
+            let impossible =
+                || Error::Pour { rate: rate * self.place.units.time, time, span: pour.span };
+            if !(rate >= 0.0 && rate.is_finite()) {
+                return Err(impossible());
+            }
+            if rate == 0.0 {
+                continue;
+            }
+            let (place, rate) = match &pour.place {
+                None => (ground::Place::Everywhere, rate * metre),
+                Some((program, radius)) => {
+                    let mut at = [f64::NAN; 3];
+                    program.eval(&[time], &mut Vec::new(), &mut at);
+                    if at.iter().any(|at| !at.is_finite()) {
+                        return Err(impossible());
+                    }
+                    let centre = [at[0] * metre, at[2] * metre];
+                    (ground::Place::Disc { centre, radius: radius * metre }, rate * metre.powi(3))
+                }
+            };
+            pours.push(ground::Pour { id: number as u64, place, rate });
+        }
+        Ok(pours)
+    }
+
+    /// The surface in units of the model.
+    fn mesh(&self, ground: &Ground, material: MaterialId) -> scene::Mesh {
+        let metre = self.place.units.length;
+        let mut points = Vec::new();
+        let mut triangles = Vec::new();
+        for mesh in [ground.mesh(), ground.heaps()] {
+            let first = points.len() as u32;
+            points.extend(mesh.points.iter().map(|point| Point::from(point / metre)));
+            triangles.extend(mesh.triangles.iter().map(|corners| (corners.map(|n| first + n), material)));
+        }
+        scene::Mesh::of_triangles(points, &[], triangles)
+    }
+
+    fn time_of(&self, number: u64) -> f64 {
+        self.place.time_at(number as f64 / TICKS)
+    }
+
+    /// The declaration of the ground.
+    fn span(&self) -> Span {
+        self.model.scenery.bed.as_ref().map(|bed| bed.span).unwrap_or_default()
+    }
+
+    /// The failure of a ground with its place in the text: that of the body, of what is poured, or of the ground.
+    fn failed(&self, error: ground::Error, time: f64) -> Error {
+        let scenery = &self.model.scenery;
+        let name = match &error {
+            ground::Error::Open { name, .. }
+            | ground::Error::Outside { name, .. }
+            | ground::Error::Body { name, .. }
+            | ground::Error::Fast { name, .. } => Some(name.as_str()),
+            _ => None,
+        };
+        let declared = || {
+            let mut bodies = scenery.solids.iter().chain(&scenery.shelves);
+            let is_it = |name: &str| bodies.find(|(kind, _)| *self.model.kinds.get(*kind).name == *name);
+            name.and_then(is_it).map(|(_, span)| *span)
+        };
+        let poured = matches!(&error, ground::Error::Height { name, .. } if *name != "the ground")
+            || matches!(&error, ground::Error::Outside { name, .. } if name == "a pour");
+        let pour = scenery.pours.first().filter(|_| poured).map(|pour| pour.span);
+        let span = declared().or(pour).unwrap_or_else(|| self.span());
+        Error::Ground { error, time, metre: self.place.units.length, span }
+    }
+}
+
+/// The columns that a declaration describes, in SI.
+fn describe(bed: &Bed, soil: &Soil, metre: f64) -> Description {
+    let cell = bed.cell * metre;
+    let depth = bed.depth.map_or(DEEP * cell, |depth| depth * metre);
+    let last = (bed.extent / bed.cell).round() as i32;
+    let declared = bed.clone();
+    let height = move |x: f64, z: f64| declared.surface(x / metre, z / metre) * metre - depth;
+    let flat = bed.height.level().map(|height| ground::Relief::Level(height * metre - depth));
+    Description {
+        cell,
+        extent: Extent::around(last),
+        soil: material(soil),
+        bed: flat.unwrap_or_else(|| ground::Relief::function(height)),
+        depth: ground::Relief::Level(depth),
+    }
+}
+
+/// A soil with what it has of its base.
+fn material(soil: &Soil) -> ground::Soil {
+    let base = match soil.base {
+        SoilBase::Sand => ground::Soil::sand(),
+        SoilBase::Mud => ground::Soil::mud(),
+        SoilBase::Snow => ground::Soil::snow(),
+        SoilBase::Soil => ground::Soil::earth(),
+    };
+    let repose = soil.repose.unwrap_or(base.repose);
+    ground::Soil {
+        repose,
+        // What is pressed stands no less steep.
+        inner: soil.inner.unwrap_or(base.inner.max(repose)),
+        push: soil.push.unwrap_or(base.push),
+        rough: soil.rough.unwrap_or(base.rough),
+        flow: soil.flow.unwrap_or(base.flow),
+        cohesion: soil.cohesion.unwrap_or(base.cohesion),
+        weight: soil.weight.unwrap_or(base.weight),
+        swell: soil.swell.unwrap_or(base.swell),
+    }
+}
+
+/// Keeps a moment that was asked for: it may be asked for again.
+fn keep(moment: &Moment, state: &mut State) {
+    let before = state.kept.range(..moment.number).next_back();
+    let own = match before {
+        Some((_, (before, _))) => moment.ground.changed_since(&before.ground).len() * 32 * 32,
+        None => moment.ground.stored(),
+    };
+    state.kept.insert(moment.number, (moment.clone(), own + 1));
+    let mut size: usize = state.kept.values().map(|(_, size)| size).sum();
+    while size > MOST_KEPT && state.kept.len() > 1 {
+        size -= state.kept.pop_first().map_or(0, |(_, (_, size))| size);
+    }
+}
+
+/// Sets a mark where one is due.
+fn mark<'m>(present: &Course<'m>, state: &mut State<'m>) {
+    let number = present.moment.number;
+    let is_new = state.marks.last().is_none_or(|mark| mark.moment.number < number);
+    if number.is_multiple_of(state.spacing) && is_new {
+        state.marks.push(present.clone());
+    }
+    let stored = |marks: &[Course]| marks.iter().map(|mark| mark.moment.ground.stored()).sum::<usize>();
+    while state.marks.len() > MOST_MARKS || (stored(&state.marks) > MOST_KEPT && state.marks.len() > 1) {
+        state.spacing *= 2;
+        let spacing = state.spacing;
+        state.marks.retain(|mark| mark.moment.number.is_multiple_of(spacing));
+        if state.marks.len() <= 1 {
+            break;
+        }
+    }
+}
