@@ -141,6 +141,8 @@ struct Remarks {
     waiting: Vec<Diagnostic>,
     /// What is written holds no gases.
     lacks_gases: bool,
+    /// What is written holds no ground of soil.
+    lacks_ground: bool,
 }
 
 /// The content of the file of `--stats`.
@@ -302,8 +304,10 @@ impl ModelRun {
     /// Draws the strings of a run, with plants of other models.
     pub fn nursery(&self) -> Nursery<'_> {
         let nursery = Nursery::new(&self.session.model, self.settings).for_picture(self.detail);
-        let lacks_gases = self.remarks.lock().unwrap_or_else(PoisonError::into_inner).lacks_gases;
-        if lacks_gases { nursery.without_gases() } else { nursery }
+        let Remarks { lacks_gases, lacks_ground, .. } =
+            *self.remarks.lock().unwrap_or_else(PoisonError::into_inner);
+        let nursery = if lacks_gases { nursery.without_gases() } else { nursery };
+        if lacks_ground { nursery.without_ground() } else { nursery }
     }
 
     /// Notes that files or pages of some sort do not hold the gases of the model, if it has any; these are not followed then.
@@ -315,6 +319,17 @@ impl ModelRun {
                 .help("PNG pictures and films show gases: `dlsys render MODEL --format png`; OBJ and USDA files have blobs as points");
             self.note(vec![warning]);
             self.remarks.lock().unwrap_or_else(PoisonError::into_inner).lacks_gases = true;
+        }
+    }
+
+    /// Notes that files or pages of some sort do not hold ground of soil, if the model has one; it is not followed then.
+    pub fn note_missing_ground(&self, what: &str) {
+        if let Some(bed) = &self.session.model.scenery.bed {
+            let warning = Diagnostic::warning(format!("{what} does not hold ground of soil"))
+                .at(bed.span, "it is not seen in it")
+                .help("pictures (PNG, SVG), films and OBJ files have it: `dlsys render MODEL --format png`");
+            self.note(vec![warning]);
+            self.remarks.lock().unwrap_or_else(PoisonError::into_inner).lacks_ground = true;
         }
     }
 

@@ -115,6 +115,7 @@ fn spare(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
 fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     run.note_missing_gases("the page for the browser");
+    run.note_missing_ground("the page for the browser");
     let mut clock = run.clock;
     let nothing = Survey::new(View::FRONT);
     let mut survey = nothing.clone();

@@ -53,6 +53,7 @@ mod strain;
 mod strain_runs;
 mod surroundings;
 mod sway;
+mod terrain;
 mod textures;
 mod usd;
 mod usd_reader;

@@ -49,18 +49,31 @@ const ROUGH: Quantity = Quantity {
 };
 const FLOW: Quantity =
     positive("rate of slipping", " m²/s", "it is greater than 0; 0.05 m²/s without it, less for slow mud");
-const COHESION: Quantity =
-    not_negative("cohesion", " kPa", "it is 0 or greater: 0 for dry sand, up to 20 for sandy loam, 5 to 50 for loam");
-const WEIGHT: Quantity =
-    positive("weight", " kN/m³", "it is greater than 0: about `weight 19` for sand, `18` for loam, `1` to `3` for snow");
+const COHESION: Quantity = not_negative(
+    "cohesion",
+    " kPa",
+    "it is 0 or greater: 0 for dry sand, up to 20 for sandy loam, 5 to 50 for loam",
+);
+const WEIGHT: Quantity = positive(
+    "weight",
+    " kN/m³",
+    "it is greater than 0: about `weight 19` for sand, `18` for loam, `1` to `3` for snow",
+);
 const SWELL: Quantity = Quantity {
     most: 1.0,
-    ..not_negative("part", "", "it is the part by which loosened soil expands, from 0 to 1: 0.1 to 0.3 for loam")
+    ..not_negative(
+        "part",
+        "",
+        "it is the part by which loosened soil expands, from 0 to 1: 0.1 to 0.3 for loam",
+    )
 };
 const CELL: Quantity =
     positive("cell", "", "the width of a column is greater than 0, in units of the model: `cell 0.01`");
-const DEPTH: Quantity =
-    positive("depth", "", "the height of the soil above what does not give way is greater than 0: `depth 0.3`");
+const DEPTH: Quantity = positive(
+    "depth",
+    "",
+    "the height of the soil above what does not give way is greater than 0: `depth 0.3`",
+);
 const EXTENT: Quantity =
     positive("extent", "", "the ground goes from -E to E in x and z, and E is greater than 0: `extent 5`");
 const RATE: Quantity =
@@ -75,8 +88,7 @@ impl Builder<'_> {
             ("snow", SoilBase::Snow),
             ("soil", SoilBase::Soil),
         ];
-        const WORDS: [&str; 8] =
-            ["repose", "inner", "push", "rough", "flow", "cohesion", "weight", "swell"];
+        const WORDS: [&str; 8] = ["repose", "inner", "push", "rough", "flow", "cohesion", "weight", "swell"];
         if let Some(before) = self.scenery.soils.iter().find(|soil| soil.name == name.text) {
             let twice = Diagnostic::error(format!("the soil `{}` is declared twice", name.text))
                 .at(name.span, "the second time")
@@ -164,12 +176,7 @@ impl Builder<'_> {
         found
     }
 
-    pub(crate) fn bed(
-        &mut self,
-        (soil, file): (&Name, Option<&Text>),
-        attributes: &[Attribute],
-        span: Span,
-    ) {
+    pub(crate) fn bed(&mut self, (soil, file): (&Name, Option<&Text>), attributes: &[Attribute], span: Span) {
         let number = self.soil_number(soil);
         let [cell, depth, height, extent] = self.sorted(attributes, ["cell", "depth", "height", "extent"]);
         if cell.is_none() {
@@ -319,7 +326,10 @@ impl Builder<'_> {
                 self.scope.diagnostics.push(
                     Diagnostic::warning(format!("the soil `{}` is not used", soil.name))
                         .at(soil.span, "declared here")
-                        .help(format!("make the ground of it: `ground {} cell 0.01`, or remove this line", soil.name)),
+                        .help(format!(
+                            "make the ground of it: `ground {} cell 0.01`, or remove this line",
+                            soil.name
+                        )),
                 );
             }
         }
@@ -390,7 +400,9 @@ mod tests {
     fn heights_are_bilinear_between_the_values_of_a_file() {
         let grid = parse_heights("# a ramp\n0, 1, 2\n\n10; 11; 12\n").expect("a grid");
         let relief = Relief::Grid(grid);
-        for (x, z, height) in [(-4.0, -4.0, 0.0), (4.0, 4.0, 12.0), (0.0, 0.0, 6.0), (2.0, -4.0, 1.5), (9.0, 9.0, 12.0)] {
+        for (x, z, height) in
+            [(-4.0, -4.0, 0.0), (4.0, 4.0, 12.0), (0.0, 0.0, 6.0), (2.0, -4.0, 1.5), (9.0, 9.0, 12.0)]
+        {
             assert_eq!(relief.at(x, z, 4.0), height, "at {x}, {z}");
         }
     }

@@ -114,7 +114,9 @@ mod tests {
         shelf.shelf = true;
         assert!(ground.heaps().triangles.is_empty());
         for _ in 0..240 {
-            ground.advance(&[Pour { id: 1, place: Place::Everywhere, rate: 0.01 }], &[shelf.clone()]).expect("a tick");
+            ground
+                .advance(&[Pour { id: 1, place: Place::Everywhere, rate: 0.01 }], &[shelf.clone()])
+                .expect("a tick");
         }
         let mesh = ground.heaps();
         let summit = mesh.points.iter().map(|p| p.y).fold(0.0, f64::max);

@@ -21,6 +21,11 @@ pub struct Mesh {
 /// How far an untouched surface may lie beside the triangles that stand for it, in columns.
 const FLAT: f64 = 0.02;
 
+/// A body nearer above a column than this presses on it, in quanta.
+const TOUCHING: i64 = 1 << 30;
+/// Columns around one.
+const AROUND: [(i32, i32); 8] = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+
 /// A mesh in the making.
 struct Weaver<'a> {
     ground: &'a Ground,
@@ -42,6 +47,22 @@ impl Ground {
             }
         }
         weaver.mesh
+    }
+
+    /// The height at which a column is drawn: under a body that presses on it, up to the ground beside the body, so that the surface closes with the
+    /// body. The difference is within the body.
+    fn shown(&self, i: i32, k: i32) -> i64 {
+        let top = self.top(i, k);
+        let (i, k) = self.extent().mirrored(i, k);
+        let roof = self.roof((i, k));
+        if roof == i64::MAX || roof - top > TOUCHING {
+            return top;
+        }
+        let lid = self.floors.get(&(i, k)).and_then(|floors| floors.iter().find(|floor| floor.base >= roof));
+        let free = |(di, dk): &(i32, i32)| self.roof((i + di, k + dk)) == i64::MAX;
+        let beside = AROUND.iter().filter(|at| free(at)).map(|(di, dk)| self.top(i + di, k + dk)).max();
+        let most = lid.map_or(top, |lid| roof + (lid.base - roof) / 2);
+        beside.map_or(top, |beside| beside.min(most).max(top))
     }
 
     /// First and last corner of the squares of a tile along x and z.
@@ -116,7 +137,8 @@ impl Weaver<'_> {
         let (ground, points) = (self.ground, &mut self.mesh.points);
         *self.numbers.entry((i, k)).or_insert_with(|| {
             let cell = ground.cell();
-            points.push(Vector::new(f64::from(i) * cell, ground.column(i, k), f64::from(k) * cell));
+            let height = ground.shown(i, k) as f64 / QUANTA * cell;
+            points.push(Vector::new(f64::from(i) * cell, height, f64::from(k) * cell));
             points.len() as u32 - 1
         })
     }

@@ -42,7 +42,7 @@ pub(crate) fn follow(
     options: &Options,
     progress: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Vec<GasTrack>, Error> {
-    let nursery = Nursery::new(&session.model, settings).with_threads(options.threads);
+    let nursery = Nursery::new(&session.model, settings).without_ground().with_threads(options.threads);
     let mut simulation = session.simulate(settings)?;
     let (mut scene, mut string) = (nursery.blank(), ModuleString::default());
     let mut tracks: Vec<GasTrack> = Vec::new();

@@ -203,7 +203,7 @@ pub fn grow(
         return Err(Error::TooLong { seconds, limit: Options::LONGEST });
     }
     let settings = Settings { log: true, ..settings };
-    let nursery = Nursery::new(model, settings).without_gases();
+    let nursery = Nursery::new(model, settings).without_gases().without_ground();
     let mut blank = nursery.blank();
     blank.notes_poses = true;
     let tolerance = options.tolerance();

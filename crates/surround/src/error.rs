@@ -383,7 +383,9 @@ fn pressing(error: &ground::Error, time: f64, metre: f64) -> String {
     match error {
         ground::Error::Open { name, at: place } => {
             let place = at(*place);
-            format!("the surface of `{name}` is not closed at t = {time}: above and below (x, z) = {place}, it is entered and left unequally often")
+            format!(
+                "the surface of `{name}` is not closed at t = {time}: above and below (x, z) = {place}, it is entered and left unequally often"
+            )
         }
         ground::Error::Outside { name, at: place } if name == "a pour" => {
             format!("what is poured at (x, z) = {} falls beside the ground at t = {time}", at(*place))
@@ -421,21 +423,24 @@ fn help_on_ground(error: &ground::Error) -> (&'static str, &'static str) {
         ground::Error::Outside { .. } => {
             ("declared here", "the ground goes from -E to E in x and z: `extent E` makes it larger")
         }
-        ground::Error::Body { .. } => ("declared here", "look at its size in `units`, and at the width of a `cell`"),
+        ground::Error::Body { .. } => {
+            ("declared here", "look at its size in `units`, and at the width of a `cell`")
+        }
         ground::Error::Fast { .. } => (
             "declared here",
             "`units time S` is the pace of the film: S seconds in a unit of t; a larger `cell` allows longer ways",
         ),
-        ground::Error::Height { .. } => {
-            ("declared here", "heights are within 65,536 cells: look at the `rate`, at the `height`, and at the `cell`")
-        }
-        ground::Error::Memory { .. } => {
-            ("declared here", "a larger `cell` needs less memory, and so does a smaller place that is touched or poured on")
-        }
-        ground::Error::Value { name, .. } if name.contains("sweeps") => (
+        ground::Error::Height { .. } => (
             "declared here",
-            "a larger `cell` needs fewer of them, and so does a smaller `flow` of the soil",
+            "heights are within 65,536 cells: look at the `rate`, at the `height`, and at the `cell`",
         ),
+        ground::Error::Memory { .. } => (
+            "declared here",
+            "a larger `cell` needs less memory, and so does a smaller place that is touched or poured on",
+        ),
+        ground::Error::Value { name, .. } if name.contains("sweeps") => {
+            ("declared here", "a larger `cell` needs fewer of them, and so does a smaller `flow` of the soil")
+        }
         _ => ("declared here", "look at the values of its soil, and at its `cell` and `extent` in `units`"),
     }
 }

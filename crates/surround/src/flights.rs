@@ -195,7 +195,13 @@ impl<'m> Flights<'m> {
                         loose.attitude.inverse_transform_vector(&(here.0 - loose.centre)),
                         loose.attitude.inverse().to_rotation_matrix().into_inner() * here.1,
                     );
-                    let ground = place.ground.map(Ground::at);
+                    // Soil is as level there as it is below the release.
+                    let level = || {
+                        let bed = model.scenery.bed.as_ref()?;
+                        let at = loose.centre / place.units.length;
+                        Some(bed.surface(at.x, at.z) * place.units.length)
+                    };
+                    let ground = place.ground.or_else(level).map(Ground::at);
                     let fall = Fall::new(loose.body, motion, time, ground, self.settings).map_err(failed)?;
                     Release { begin: time, origin: part.origin, fall: Some(fall), offset, axes }
                 }

@@ -48,8 +48,8 @@ pub use gases::{Gases, MOST_BLOBS, TICK as GAS_TICK};
 pub use loose::Loose;
 pub use motion::{MOST_TICKS, Motion, Passive};
 pub use place::Place;
-pub use terrain::{TICKS as GROUND_TICKS, Terrain, TerrainReport};
 pub use survey::{Axis, Survey, Vibration, moves};
+pub use terrain::{TICKS as GROUND_TICKS, Terrain, TerrainReport};
 pub use weather::{Sampler, Weather};
 
 /// Seconds from one tick of the clock to the next.

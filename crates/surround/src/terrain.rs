@@ -116,8 +116,12 @@ impl<'m> Terrain<'m> {
             memory: MEMORY,
             ..ground::Settings::default()
         };
-        let ground = Ground::new(description, of_ground)
-            .map_err(|error| Error::Ground { error, time: 0.0, metre: place.units.length, span: bed.span })?;
+        let ground = Ground::new(description, of_ground).map_err(|error| Error::Ground {
+            error,
+            time: 0.0,
+            metre: place.units.length,
+            span: bed.span,
+        })?;
         let growth = coupled::start(model, settings, place)?;
         let moment = Moment { number: 0, ground, bodies: Arc::default() };
         let state = State {
@@ -220,7 +224,8 @@ impl<'m> Terrain<'m> {
                 let mut string = ModuleString::default();
                 course.growth.at(self.time_of(0), &mut string)?;
                 course.growth.take_events();
-                course.moment.bodies = Arc::new(self.bodies(&string, &[], &Descent::default(), state, motion)?);
+                course.moment.bodies =
+                    Arc::new(self.bodies(&string, &[], &Descent::default(), state, motion)?);
             }
             (state.start, state.has_begun) = (course, true);
         }
@@ -300,8 +305,7 @@ impl<'m> Terrain<'m> {
         let mut pours = Vec::new();
         for (number, pour) in self.model.scenery.pours.iter().enumerate() {
             let rate = pour.rate.eval_one(&[time]) / self.place.units.time;
-            let impossible =
-                || Error::Pour { rate: rate * self.place.units.time, time, span: pour.span };
+            let impossible = || Error::Pour { rate: rate * self.place.units.time, time, span: pour.span };
             if !(rate >= 0.0 && rate.is_finite()) {
                 return Err(impossible());
             }

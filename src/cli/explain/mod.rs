@@ -39,6 +39,7 @@ mod curves;
 mod falling;
 mod gas;
 mod given;
+mod ground;
 mod plan;
 mod scene;
 #[cfg(test)]

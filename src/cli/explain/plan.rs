@@ -6,6 +6,7 @@ use super::bending::BendingPlan;
 use super::curves::CurvePlan;
 use super::falling::FallingPlan;
 use super::gas;
+use super::ground;
 use super::scene::{self, ScenePart};
 use super::{given, words};
 use crate::diagnostic::Source;
@@ -190,6 +191,7 @@ impl Explanation {
         let falling = FallingPlan::all(model);
         scene.extend(falling.iter().map(|falling| falling.row.clone()));
         scene.extend(gas::parts(model));
+        scene.extend(ground::part(model));
         Explanation {
             model: session.source.name.clone(),
             title: model.title.clone(),

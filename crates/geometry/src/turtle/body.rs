@@ -70,7 +70,8 @@ impl DrawnBody {
         let first = self.points.len() as u32;
         let place = &surface.placement;
         self.points.extend(surface.mesh.vertices.iter().map(|vertex| place.point(*vertex)));
-        self.triangles.extend(surface.mesh.faces.iter().map(|face| face.corners.map(|corner| first + corner)));
+        self.triangles
+            .extend(surface.mesh.faces.iter().map(|face| face.corners.map(|corner| first + corner)));
     }
 
     /// Adds a polygon as a fan: where it is not convex, triangles that lie over each other count with their signs.
@@ -150,7 +151,9 @@ mod tests {
         let mut model = Model::default();
         let mut string = ModuleString::default();
         for (place, (name, parameters)) in
-            [("!", &[0.2][..]), ("F", &[1.0]), ("+", &[30.0]), ("@O", &[0.5]), ("f", &[1.0])].iter().enumerate()
+            [("!", &[0.2][..]), ("F", &[1.0]), ("+", &[30.0]), ("@O", &[0.5]), ("f", &[1.0])]
+                .iter()
+                .enumerate()
         {
             let kind = model.kinds.intern(name, parameters.len());
             string.push(kind, parameters.iter().copied(), 0.5, Lineage::of_axiom(place));
@@ -162,7 +165,8 @@ mod tests {
         let bodies = turtle::bodies(&model, &string, None, 0.01, &mut scene).expect("drawable");
         assert_eq!(bodies.len(), 2);
         let round = std::f64::consts::PI;
-        for (body, exact, most) in [(&bodies[0], round * 0.01, 0.05), (&bodies[1], round * 0.125 / 6.0, 0.02)] {
+        for (body, exact, most) in [(&bodies[0], round * 0.01, 0.05), (&bodies[1], round * 0.125 / 6.0, 0.02)]
+        {
             let (volume, is_closed) = volume(body);
             assert!(is_closed && !body.is_shelf);
             assert!((volume / exact - 1.0).abs() < most, "{volume} {exact}");

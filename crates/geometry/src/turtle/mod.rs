@@ -74,8 +74,8 @@ mod organ_tests;
 mod tests;
 
 use crate::scene::{Point, Scene, Vector};
-pub use body::DrawnBody;
 pub use bent::{PartKey, StemKey, Strains};
+pub use body::DrawnBody;
 use command::Command;
 use dlsys_diagnostic::Span;
 use dlsys_model::{DETACH, KindId, Model, SOURCE};

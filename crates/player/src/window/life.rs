@@ -47,7 +47,7 @@ pub struct Living<'s> {
 
 impl<'s> Living<'s> {
     pub fn new(session: &'s Session, settings: Settings, [from, to]: [f64; 2], step: f64) -> Living<'s> {
-        let nursery = Nursery::new(&session.model, settings);
+        let nursery = Nursery::new(&session.model, settings).without_ground();
         let frames = if step > 0.0 { ((to - from) / step).round() as usize } else { 0 };
         let pieces = frames.clamp(1, MOST_COUNTED);
         let times = (0..=pieces).map(|i| from + (to - from) * i as f64 / pieces as f64).collect();

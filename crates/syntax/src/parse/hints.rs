@@ -176,7 +176,12 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (_, ":") if matches!(item, Rule::ignore_item | Rule::consider_item) => {
             "names stand behind the word, without a colon: `ignore F_x @L`; turns and other symbols are passed over anyway"
         }
-        (_, ",") if matches!(item, Rule::ignore_item | Rule::consider_item | Rule::solid_item | Rule::shelf_item) => {
+        (_, ",")
+            if matches!(
+                item,
+                Rule::ignore_item | Rule::consider_item | Rule::solid_item | Rule::shelf_item
+            ) =>
+        {
             "there are spaces between names: `Ball Post`"
         }
         (_, "<" | ">") if item == Rule::interpret_item => {

@@ -1,0 +1,47 @@
+//! Ground of soil (`ground SOIL cell …`): its columns, and whether they are followed tick by tick.
+
+use super::scene::ScenePart;
+use crate::model::{Bed, Model};
+use crate::sim::brief;
+use crate::surround::GROUND_TICKS;
+
+/// The row of the table of the scene, if there is such a ground.
+pub fn part(model: &Model) -> Option<ScenePart> {
+    let scenery = &model.scenery;
+    let bed = scenery.bed.as_ref()?;
+    let name = format!("ground {}", scenery.soils[bed.soil].name);
+    let columns = columns(bed);
+    let kinds = |all: &[(crate::model::KindId, _)]| {
+        all.iter().map(|(kind, _)| format!("`{}`", model.kinds.get(*kind).name)).collect::<Vec<_>>()
+    };
+    let mut reasons = Vec::new();
+    let (solids, shelves) = (kinds(&scenery.solids), kinds(&scenery.shelves));
+    if !solids.is_empty() {
+        reasons.push(format!("{} press into it and carry it", solids.join(", ")));
+    }
+    if !shelves.is_empty() {
+        reasons.push(format!("{} carry what falls", shelves.join(", ")));
+    }
+    if !scenery.pours.is_empty() {
+        reasons.push(format!("`pour` adds to it in {} place(s)", scenery.pours.len()));
+    }
+    if reasons.is_empty() {
+        let why = format!(
+            "{columns}; nothing touches it, so it moves only where it is steeper than it can stand at t = 0, until it rests"
+        );
+        return Some(ScenePart::new(name, "nothing to do", why));
+    }
+    let t = model.frames.map_or(0.0, |frames| frames.to);
+    let ticks = brief((t * scenery.units.time * GROUND_TICKS).ceil(), 9);
+    let why = format!(
+        "{columns}; {}: {ticks} ticks of 1/{GROUND_TICKS} s up to t = {}, with memory and work for columns that are touched or slip",
+        reasons.join("; "),
+        brief(t, 6)
+    );
+    Some(ScenePart::new(name, "in steps", why))
+}
+
+fn columns(bed: &Bed) -> String {
+    let side = 2.0 * (bed.extent / bed.cell).round() + 1.0;
+    format!("{side} × {side} columns, {} apart", brief(bed.cell, 6))
+}

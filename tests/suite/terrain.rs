@@ -1,0 +1,177 @@
+//! Ground of soil through the whole pipeline: `soil`, `ground SOIL cell …`, `solid`, `shelf` and `pour` from the text to columns, pictures and files.
+
+use dlsys::Format;
+use dlsys::render::{FrameWriter, Survey, View};
+use dlsys::scene::{MaterialId, Scene};
+use dlsys::session::{Nursery, Session};
+use dlsys::sim::Settings;
+use dlsys::surround::Terrain;
+use dlsys::tree::ModuleString;
+
+/// A ball that sinks into sand, and rests.
+const BALL: &str = "soil dry = sand\nground dry cell 0.01 depth 0.3 extent 0.5\nsolid Ball\ninitial string: Ball(0.2)\n\
+    Ball(y): if y > 0.05 solve dy/dt = -0.3 if y <= 0.05 solve dy/dt = 0\ninterpret Ball(y): [ f(y) @O(0.2) ]\n";
+/// Snow that falls on a leaf, and on the ground around it.
+const LEAF: &str = "soil powder = snow, repose 40\nground powder cell 0.01 depth 0.1 extent 0.4\nshelf Leaf\npour powder rate if t < 1 then 0.02 else 0\n\
+    initial string: Leaf\ninterpret Leaf: f(0.2) -(90) f(-0.1) { . f(0.2) . +(90) &(90) f(0.1) ^(90) . +(90) f(0.2) . }\n";
+/// Sand that is poured at a place.
+const CONE: &str = "soil dry = sand, repose 30\nground dry cell 0.01 extent 0.4\npour dry rate if t < 1 then 0.003 else 0 at 0, 1, 0 radius 0.02\n\
+    initial string: F(0.01)\n";
+
+fn session(text: &str) -> Session {
+    Session::from_text("ground.dls", text, &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn terrain(session: &Session, threads: usize) -> Terrain<'_> {
+    let made = Terrain::new(&session.model, Settings::default(), threads);
+    made.unwrap_or_else(|error| panic!("{}", error.diagnostic().message)).expect("a ground of soil")
+}
+
+/// The heights of a mesh, to the bit.
+fn bits(terrain: &Terrain, time: f64) -> Vec<[u64; 3]> {
+    let mesh = terrain.at(time, MaterialId::LEAF, None).unwrap_or_else(|error| panic!("{error}"));
+    mesh.vertices.iter().map(|p| [p.x, p.y, p.z].map(f64::to_bits)).collect()
+}
+
+fn string(session: &Session, time: f64) -> ModuleString {
+    let mut string = ModuleString::default();
+    session.simulate(Settings::default()).unwrap().at(time, &mut string).unwrap();
+    string
+}
+
+fn drawn(session: &Session, time: f64) -> Scene {
+    let nursery = Nursery::new(&session.model, Settings::default());
+    let mut scene = nursery.blank();
+    nursery.draw(&string(session, time), &mut scene).unwrap_or_else(|error| panic!("{error}"));
+    scene
+}
+
+/// The message of a time that cannot be drawn.
+fn failure(text: &str, time: f64) -> String {
+    let session = session(text);
+    let nursery = Nursery::new(&session.model, Settings::default());
+    let error = nursery.draw(&string(&session, time), &mut nursery.blank()).unwrap_err();
+    error.diagnostic().render(&session.source, false)
+}
+
+/// Times in any order, one or two threads: the same bits; and no quantum is lost.
+#[test]
+fn the_ground_depends_neither_on_the_order_of_times_nor_on_threads() {
+    for text in [BALL, LEAF, CONE] {
+        let session = session(text);
+        let (one, two) = (terrain(&session, 1), terrain(&session, 2));
+        let times = [0.0, 0.3, 0.61, 0.9, 1.4];
+        let forward: Vec<_> = times.iter().map(|time| bits(&one, *time)).collect();
+        let backward: Vec<_> = times.iter().rev().map(|time| bits(&two, *time)).collect();
+        assert!(forward.iter().eq(backward.iter().rev()));
+        assert_ne!(forward[0], forward[4], "nothing has happened");
+        // Frames in between change nothing.
+        let lone = terrain(&session, 1);
+        assert_eq!(bits(&lone, 1.4), forward[4]);
+        let report = lone.report(1.4, None).unwrap();
+        assert_eq!(report.imbalance, 0);
+        assert!(report.columns > 0 && report.updates > 0);
+    }
+}
+
+/// A ball that has sunk by its radius less 5 cm leaves its shape, and sand around it is higher.
+#[test]
+fn a_ball_presses_its_shape_into_sand() {
+    let session = session(BALL);
+    let ground = terrain(&session, 1);
+    let height = |x: f64| ground.height(1.0, [x, 0.0], None).unwrap();
+    assert!((height(0.0) + 0.05).abs() < 0.002, "{}", height(0.0));
+    let rim = (90..130).map(|mm| height(f64::from(mm) / 1000.0)).fold(0.0, f64::max);
+    assert!(rim > 0.001, "a rim of {rim}");
+    assert_eq!(height(0.45), 0.0);
+}
+
+/// A poured heap has the volume of what was poured and the angle of repose: its height is the cube root of 3 V tan² φ / π.
+#[test]
+fn a_poured_cone_stands_at_the_angle_of_repose() {
+    let session = session(CONE);
+    let ground = terrain(&session, 1);
+    let exact = (3.0 * 0.003 * 30_f64.to_radians().tan().powi(2) / std::f64::consts::PI).cbrt();
+    let summit = ground.height(4.0, [0.0, 0.0], None).unwrap();
+    assert!((summit / exact - 1.0).abs() < 0.08, "{summit} {exact}");
+}
+
+/// Half of the snow that falls above a shelf lies on it; the ground below it is bare of new snow, that beside it is not.
+#[test]
+fn a_leaf_carries_snow() {
+    let session = session(LEAF);
+    let ground = terrain(&session, 1);
+    let report = ground.report(1.5, None).unwrap();
+    // 2 cm on 20 cm × 10 cm, less what has slipped off the edges.
+    assert!(report.carried > 0.5 * 0.0004 && report.carried < 1.02 * 0.0004, "{}", report.carried);
+    let far = ground.height(1.5, [0.35, 0.35], None).unwrap();
+    assert!((far - 0.02).abs() < 1e-9, "{far}");
+    let scene = drawn(&session, 1.5);
+    let mesh = &scene.surfaces.last().unwrap().mesh;
+    assert!(mesh.vertices.iter().any(|p| p.y > 0.2), "what lies on the leaf is drawn");
+}
+
+/// Framing ignores the ground; pictures have it, and files have it as a group.
+#[test]
+fn pictures_and_files_have_the_ground() {
+    let session = session(BALL);
+    let scene = drawn(&session, 1.0);
+    let mut survey = Survey::new(View::FRONT);
+    survey.add(&scene);
+    let [low, high] = survey.fit().bounds.unwrap();
+    assert!((high.x - low.x) < 0.25, "the ball only: {} to {}", low.x, high.x);
+    let obj = String::from_utf8(FrameWriter::new(Format::OBJ, survey.fit()).write(&scene, "ball")).unwrap();
+    assert!(obj.contains("\ng ground\nusemtl ground\n"));
+}
+
+/// A rigid floor, and no floor, have no surface; the turtle is set down on soil as on a floor.
+#[test]
+fn a_rigid_floor_is_as_before() {
+    for text in ["ground 0\ninitial string: F(1)", "initial string: F(1)"] {
+        let session = session(text);
+        assert!(Terrain::new(&session.model, Settings::default(), 1).unwrap().is_none());
+        let scene = drawn(&session, 0.0);
+        assert!(scene.terrain.is_none() && scene.surfaces.is_empty());
+    }
+    let soil = session(
+        "soil a = sand\nground a cell 0.1 height 0.5 + 0.1*x extent 2\ninitial string: -(90) f(1) +(90) f(3) @G F(1)",
+    );
+    let start = drawn(&soil, 0.0).segments[0].start;
+    assert!((start.y - 0.6).abs() < 1e-12, "{start}");
+}
+
+/// What cannot be: a message with its place and a remedy.
+#[test]
+fn what_cannot_be_says_where() {
+    let open = BALL.replace("@O(0.2)", "-(90) { . f(0.2) . &(90) f(0.2) . &(90) f(0.2) . }");
+    let said = failure(&open, 1.0);
+    assert!(said.contains("the surface of `Ball` is not closed") && said.contains("is a `shelf`"), "{said}");
+    let outside = BALL.replace("[ f(y)", "[ -(90) f(0.5) +(90) f(y)");
+    let said = failure(&outside, 1.0);
+    assert!(said.contains("where there is no ground") && said.contains("ground.dls:3:7"), "{said}");
+    let much = CONE.replace("0.003", "1e12");
+    let said = failure(&much, 1.0);
+    assert!(said.contains("what is poured") && said.contains("65,536 cells"), "{said}");
+    let negative = CONE.replace("else 0", "else -1");
+    let said = failure(&negative, 2.0);
+    assert!(said.contains("the rate -1 at t = ") && said.contains("0 or greater"), "{said}");
+    let fine = BALL.replace("cell 0.01", "cell 0.00001").replace("extent 0.5", "extent 0.0005");
+    assert!(failure(&fine, 0.0).contains("a larger `cell`"), "{}", failure(&fine, 0.0));
+}
+
+/// Words that are wrong, when the model is read.
+#[test]
+fn wrong_words_are_refused() {
+    for (text, said) in [
+        ("soil a = sand\nground a cell 0", "0"),
+        ("soil a = sand, repose 95\nground a cell 1", "95"),
+        ("soil a = sand, repose 40, inner 30\nground a cell 1", "pressed soil is less steep"),
+        ("ground a cell 1", "there is no soil `a`"),
+        ("soil a = sand\npour a rate 1", "there is none"),
+        ("soil a = sand\nground a cell 0.001 extent 100", "cells on a side"),
+    ] {
+        let text = format!("{text}\ninitial string: F(1)");
+        let error = Session::from_text("ground.dls", &text, &[]).unwrap_err().to_string();
+        assert!(error.contains(said), "{text}\n{error}");
+    }
+}
