@@ -1,4 +1,4 @@
-//! The declarations of a scene: plants of other models, light, sky, camera and floor; wind and tissues are in `physics.rs`.
+//! The declarations of a scene: plants of other models, light, sky, camera and floor; wind and tissues are in `physics.rs`, sheets in `sheets.rs`.
 //! From the syntax tree to the model.
 
 use std::cell::Cell;
@@ -88,6 +88,12 @@ pub(crate) fn build(
             _ => {}
         }
     }
+    // They name tissues, which may stand behind them.
+    for (item, span) in &document.items {
+        if let Item::Sheet { name, file, tissue, pinned } = item {
+            builder.sheet((name, file, tissue, *pinned), *span, appearance);
+        }
+    }
     builder.scenery
 }
 
@@ -95,7 +101,7 @@ pub(crate) fn build(
 pub(crate) struct Builder<'b> {
     pub(crate) document: &'b Document,
     pub(crate) scope: &'b mut Scope,
-    files: &'b dyn Files,
+    pub(crate) files: &'b dyn Files,
     pub(crate) scenery: Scenery,
     /// Declarations that may stand once, with their places.
     seen: Vec<(&'static str, Span)>,

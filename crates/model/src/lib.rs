@@ -42,6 +42,7 @@ mod picture;
 mod remedy;
 mod rule;
 mod scenery;
+mod sheet;
 mod solution_form;
 mod stepping;
 mod successor;
@@ -63,6 +64,7 @@ pub use picture::{Drawn, Footprint, Picture, Texture};
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Switch};
 pub use scenery::{Camera, Plant, Scenery};
+pub use sheet::Sheet;
 pub use solution_form::{
     AffineSum, DrivenGrowth, GrowthLaw, Jacobian, LinearRates, Numeric, Obstacle, SolutionForm, ZeroCrossing,
 };

@@ -21,7 +21,7 @@ use dlsys_geometry::scene::{Bounds, Plant, Scene, Seedling, Width};
 use dlsys_geometry::turtle::{self, Strains};
 use dlsys_model::{self as model, Model};
 use dlsys_sim::{self as sim, Settings, Simulation, brief};
-use dlsys_surround::{self as surround, Classes, Gases, Motion, Passive as Following, Place, Weather};
+use dlsys_surround::{self as surround, Classes, Gases, Motion, Passive as Following, Place, Sheets, Weather};
 use dlsys_tree::ModuleString;
 
 /// Most simulations that are kept from one scene to the next.
@@ -105,6 +105,7 @@ struct Passive<'m> {
     around: Around<'m>,
     motion: Option<Motion<'m>>,
     gases: Option<Gases<'m>>,
+    sheets: Option<Sheets<'m>>,
 }
 
 impl<'m> Nursery<'m> {
@@ -175,7 +176,7 @@ impl<'m> Nursery<'m> {
     /// # Errors
     /// A module that cannot be drawn, or a plant whose run or drawing fails.
     pub fn draw(&self, string: &ModuleString, scene: &mut Scene) -> Result<(), DrawError> {
-        let Passive { around, motion, gases } = self.passive()?;
+        let Passive { around, motion, gases, sheets } = self.passive()?;
         // They read the motion of stems at ticks before.
         let gases = match gases {
             Some(gases) => gases.at(string.time, motion.as_ref())?,
@@ -188,6 +189,9 @@ impl<'m> Nursery<'m> {
         let strains = bent.as_ref().map(|bent| bent as &dyn Strains);
         self.draw_with((self.settings.seed, around), string, strains, scene)?;
         scene.gases = gases;
+        if let Some(sheets) = sheets {
+            sheets.draw(string.time, scene)?;
+        }
         Ok(())
     }
 
@@ -204,7 +208,8 @@ impl<'m> Nursery<'m> {
                 true => Gases::new(model, self.settings, weather, self.threads)?,
                 false => None,
             };
-            Ok(Passive { around, motion, gases })
+            let sheets = Sheets::new(model, self.settings)?;
+            Ok(Passive { around, motion, gases, sheets })
         };
         self.passive.get_or_init(start).as_ref().map_err(Clone::clone)
     }

@@ -81,6 +81,12 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
             let (attributes, colors) = parts.values_and_colors()?;
             Item::Gas { name, attributes, colors }
         }
+        Rule::sheet_item => Item::Sheet {
+            name: parts.name(),
+            file: parts.text(),
+            tissue: parts.name(),
+            pinned: parts.expression()?,
+        },
         Rule::solid_item => Item::Solid(parts.names()),
         Rule::ignore_item => Item::Ignore(parts.names()),
         Rule::consider_item => Item::Consider(parts.names()),
@@ -176,6 +182,9 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
             let all: Vec<String> =
                 values.chain(colors.iter().map(|color| format!("color \"{}\"", color.text))).collect();
             format!("gas {} = {}", name.text, all.join(", "))
+        }
+        Item::Sheet { name, file, tissue, pinned } => {
+            format!("sheet {} from \"{}\" of {} pinned {}", name.text, file.text, tissue.text, show(pinned))
         }
         Item::Solid(list) => format!("solid {}", print::names(list, " ")),
         Item::Ignore(list) => format!("ignore {}", print::names(list, " ")),
