@@ -16,7 +16,9 @@ use crate::scene_checks::MaterialNumber;
 use crate::scenery::Nesting;
 use crate::scope::{Scope, Variables};
 use crate::strain::{self, Strains};
-use crate::{Setting, appearance, check, contexts, dead_rules, globals, porting, scene_checks, scenery, sheets};
+use crate::{
+    Setting, appearance, check, contexts, dead_rules, globals, porting, scene_checks, scenery, sheets,
+};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
     Appearance, DRAWN_WORDS, Frames, Interpretation, KindId, Kinds, Model, Parameter, Scenery, Successor,

@@ -148,8 +148,8 @@ impl Builder<'_> {
     fn pinned_nowhere(&mut self, name: &Name, pinned: Expression, net: &Net) {
         let range = |axis: usize| {
             let values = net.points.iter().map(|point| point[axis]);
-            let (low, high) = values
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+            let (low, high) =
+                values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
             format!("{} from {low} to {high}", ["x", "y", "z"][axis])
         };
         let ranges = [0, 1, 2].map(range).join(", ");
@@ -173,7 +173,11 @@ impl Builder<'_> {
         let (at, what, help) = match &error {
             sheet::Error::Manifold { edge: [a, b], faces } => (
                 line(&net.point_lines, *a),
-                format!("it is not manifold: {faces} faces share the edge between points {} and {}", a + 1, b + 1),
+                format!(
+                    "it is not manifold: {faces} faces share the edge between points {} and {}",
+                    a + 1,
+                    b + 1
+                ),
                 "at most two faces meet at an edge: separate what is joined there, or draw a seam as lines (`l`)",
             ),
             sheet::Error::Massless { point } => (
@@ -211,7 +215,10 @@ fn mesh(net: &Net, metre: f64) -> sheet::Mesh {
 /// The material of a tissue of constant stiffness.
 fn material(tissue: &Tissue) -> sheet::Tissue {
     let stiffness = tissue.stiffness.eval_one(&[0.0]);
-    sheet::Tissue { damping: tissue.damping, ..sheet::Tissue::new(stiffness, tissue.density, tissue.thickness) }
+    sheet::Tissue {
+        damping: tissue.damping,
+        ..sheet::Tissue::new(stiffness, tissue.density, tissue.thickness)
+    }
 }
 
 /// Warns of sheets that no string contains.

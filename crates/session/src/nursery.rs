@@ -21,7 +21,9 @@ use dlsys_geometry::scene::{Bounds, Plant, Scene, Seedling, Width};
 use dlsys_geometry::turtle::{self, Strains};
 use dlsys_model::{self as model, Model};
 use dlsys_sim::{self as sim, Settings, Simulation, brief};
-use dlsys_surround::{self as surround, Classes, Gases, Motion, Passive as Following, Place, Sheets, Weather};
+use dlsys_surround::{
+    self as surround, Classes, Gases, Motion, Passive as Following, Place, Sheets, Weather,
+};
 use dlsys_tree::ModuleString;
 
 /// Most simulations that are kept from one scene to the next.

@@ -53,7 +53,9 @@ impl Track {
     pub(crate) fn at(&self, time: f64) -> Option<State> {
         let first = self.steps.first().filter(|(begin, _)| *begin <= time)?;
         let next = self.steps.partition_point(|(end, _)| *end < time);
-        let Some((to, after)) = self.steps.get(next) else { return self.steps.last().map(|(_, last)| last.clone()) };
+        let Some((to, after)) = self.steps.get(next) else {
+            return self.steps.last().map(|(_, last)| last.clone());
+        };
         let (from, before) = if next == 0 { first } else { &self.steps[next - 1] };
         Some(Step { from: *from, to: *to, before, after, pushes: &[], depths: &[] }.at(time))
     }
@@ -119,7 +121,8 @@ impl<'m> Hanging<'m> {
         tolerance: f64,
     ) -> Hanging<'m> {
         let drapers: Arc<[bool]> = turtle::kinds_that_drape(model).into();
-        let chooses = model.kinds.iter().any(|(id, kind)| drapers[id.index()] && kind.interpretation.is_some());
+        let chooses =
+            model.kinds.iter().any(|(id, kind)| drapers[id.index()] && kind.interpretation.is_some());
         let tolerance = tolerance.clamp(1e-12, 0.1);
         let solver = Solver::new(Settings { tolerance, longest: TICK, ..Settings::default() });
         let (hung, scene) = (Vec::new(), turtle::blank(model));
@@ -255,13 +258,13 @@ impl<'m> Hanging<'m> {
             return Err(Error::TooManySheets { most: MOST_SHEET_POINTS, time, span: span() });
         }
         let metre = self.place.units.length;
-        let at = |point: &[f64; 3]| {
-            self.place.point(place.placement.point(Point::from(*point)).coords * metre)
-        };
+        let at =
+            |point: &[f64; 3]| self.place.point(place.placement.point(Point::from(*point)).coords * metre);
         let points = declared.points.iter().map(at).collect();
         let mesh = Mesh { points, faces: declared.faces.clone(), cords: declared.cords.clone() };
         let made = Sheet::new(&mesh, &material(&scenery.tissues[declared.tissue]), |_| false);
-        let made = made.map_err(|error| Error::Sheet { name: declared.name.clone(), error, time, span: span() })?;
+        let made =
+            made.map_err(|error| Error::Sheet { name: declared.name.clone(), error, time, span: span() })?;
         let made = Arc::new(made.pinned_at(&declared.pinned));
         Ok(Hung { key: place.key, origin: place.origin, sheet: place.sheet, made, begin: now })
     }
@@ -334,5 +337,8 @@ impl<'m> Hanging<'m> {
 /// The material of a tissue of constant stiffness.
 pub(crate) fn material(tissue: &Tissue) -> sheet::Tissue {
     let stiffness = tissue.stiffness.eval_one(&[0.0]);
-    sheet::Tissue { damping: tissue.damping, ..sheet::Tissue::new(stiffness, tissue.density, tissue.thickness) }
+    sheet::Tissue {
+        damping: tissue.damping,
+        ..sheet::Tissue::new(stiffness, tissue.density, tissue.thickness)
+    }
 }

@@ -51,8 +51,6 @@ impl Cubic {
 /// A solid on its way through a tick.
 #[derive(Clone, Debug)]
 pub(crate) struct Path {
-    /// The module that draws it at the beginning of the tick.
-    pub(crate) origin: Origin,
     pub(crate) shape: Shape,
     /// Where the tick begins, and its length, in s.
     begin: f64,
@@ -100,9 +98,8 @@ impl Watch {
         descent: &Descent,
         scene: &mut Scene,
     ) -> Result<(), Error> {
-        let is_solid = |module: dlsys_tree::Module| {
-            model.scenery.solids.iter().any(|(kind, _)| *kind == module.kind)
-        };
+        let is_solid =
+            |module: dlsys_tree::Module| model.scenery.solids.iter().any(|(kind, _)| *kind == module.kind);
         if !string.iter().any(is_solid) {
             return Ok(());
         }
@@ -110,13 +107,23 @@ impl Watch {
         for solid in turtle::solids(model, string, scene)? {
             let span = || {
                 let mut declared = model.scenery.solids.iter();
-                declared.find(|(kind, _)| *kind == solid.origin.kind).map(|(_, span)| *span).unwrap_or_default()
+                declared
+                    .find(|(kind, _)| *kind == solid.origin.kind)
+                    .map(|(_, span)| *span)
+                    .unwrap_or_default()
             };
             if let Some(passive) = solid.passive {
                 let kind = model.kinds.get(solid.origin.kind).name.clone();
                 let (falls, meets) = (passive == Passive::Falls, true);
                 let lineage = solid.origin.lineage;
-                return Err(Error::PassiveSolid { kind, lineage, falls, meets, time: string.time, span: span() });
+                return Err(Error::PassiveSolid {
+                    kind,
+                    lineage,
+                    falls,
+                    meets,
+                    time: string.time,
+                    span: span(),
+                });
             }
             if drawn.len() == MOST_BODIES {
                 return Err(Error::TooManySolids { most: MOST_BODIES, time: string.time, span: span() });
@@ -146,7 +153,11 @@ impl Watch {
 
     /// The ways of all solids through a tick that begins at a time and has a length, in s. What is not drawn at an instant stays where it was before.
     pub(crate) fn paths(&self, begin: f64, length: f64) -> Vec<Path> {
-        self.first.iter().zip(&self.later).filter_map(|(first, later)| path(first, later, (begin, length))).collect()
+        self.first
+            .iter()
+            .zip(&self.later)
+            .filter_map(|(first, later)| path(first, later, (begin, length)))
+            .collect()
     }
 }
 
@@ -166,7 +177,7 @@ fn path(first: &Drawn, later: &[Option<Vec<Vector>>; 3], (begin, length): (f64, 
         }
     }
     let (centre, turn) = (Cubic::through(centres), Cubic::through(turns));
-    Some(Path { origin: first.origin, shape, begin, length, centre, turn })
+    Some(Path { shape, begin, length, centre, turn })
 }
 
 /// The rotation vector that leads from places about one centre to places about another, as near as that is possible. `guess` is one for an instant before.
@@ -198,7 +209,8 @@ mod tests {
     fn a_path_is_that_of_the_drawings() {
         let corner = |k: usize| Vector::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64) * 0.2;
         let middle = Vector::repeat(0.1);
-        let (v, a, w) = (Vector::new(1.0, 2.0, -0.5), Vector::new(0.0, -9.81, 0.0), Vector::new(3.0, -20.0, 5.0));
+        let (v, a, w) =
+            (Vector::new(1.0, 2.0, -0.5), Vector::new(0.0, -9.81, 0.0), Vector::new(3.0, -20.0, 5.0));
         let at = |t: f64, k: usize| {
             middle + v * t + a * (t * t / 2.0) + Attitude::from_scaled_axis(w * t) * (corner(k) - middle)
         };

@@ -19,12 +19,12 @@ use dlsys_model::Model;
 use dlsys_sheet::{Counts, State};
 use dlsys_sim::Settings;
 
+use crate::Error;
 use crate::coupled;
 use crate::hanging::{Hanging, TICK, Tick};
 use crate::motion::MOST_TICKS;
 use crate::place::Place;
 use crate::weather::{Sampler, Weather};
-use crate::Error;
 
 /// Most points of the ticks that are kept for times that come a little late, and of marks.
 const MOST_KEPT: usize = 2_000_000;
@@ -84,9 +84,10 @@ impl<'m> Sheets<'m> {
             tick.tracks.iter().enumerate().map(|(i, track)| (track.hung.key, i)).collect();
         let places = scene.sheets.clone();
         for place in &places {
-            let known = tick.descent.line(place.key.module).find_map(|module| {
-                tracks.get(&SheetKey { module, ..place.key })
-            });
+            let known = tick
+                .descent
+                .line(place.key.module)
+                .find_map(|module| tracks.get(&SheetKey { module, ..place.key }));
             let state = known.and_then(|track| tick.tracks[*track].at(seconds));
             self.add(place, state, scene);
         }

@@ -187,7 +187,14 @@ impl Track<'_> {
                 let (span, lineage) = (self.span(solids, solid), solid.origin.lineage);
                 let falls = passive == Passive::Falls;
                 let meets = false;
-                return Err(Error::PassiveSolid { kind, lineage, falls, meets, time: self.string.time, span });
+                return Err(Error::PassiveSolid {
+                    kind,
+                    lineage,
+                    falls,
+                    meets,
+                    time: self.string.time,
+                    span,
+                });
             }
             let id = solid.origin.lineage.id;
             let before = descent.line(id).find_map(|id| known.get(&id).copied());

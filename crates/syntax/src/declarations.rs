@@ -349,7 +349,11 @@ pub static DECLARATIONS: [Declaration; 32] = [
         category: Category::Scene,
         named: Named::Surface,
         repeats: Repeats::PerName("surface"),
-        options: &[option("from", Follow::Text), option("of", Follow::Value), option("pinned", Follow::Value)],
+        options: &[
+            option("from", Follow::Text),
+            option("of", Follow::Value),
+            option("pinned", Follow::Value),
+        ],
         begins: Begins::BeforeValue,
         written: "a sheet is written `sheet @Flag from \"flag.obj\" of cloth pinned x < 0.01`",
         ..row("sheet", Rule::sheet_item)

@@ -41,6 +41,7 @@ mod gas;
 mod given;
 mod plan;
 mod scene;
+mod sheet;
 #[cfg(test)]
 mod tests;
 mod text;

@@ -7,6 +7,7 @@ use super::curves::CurvePlan;
 use super::falling::FallingPlan;
 use super::gas;
 use super::scene::{self, ScenePart};
+use super::sheet;
 use super::{given, words};
 use crate::diagnostic::Source;
 use crate::model::{
@@ -190,6 +191,7 @@ impl Explanation {
         let falling = FallingPlan::all(model);
         scene.extend(falling.iter().map(|falling| falling.row.clone()));
         scene.extend(gas::parts(model));
+        scene.extend(sheet::parts(model));
         Explanation {
             model: session.source.name.clone(),
             title: model.title.clone(),

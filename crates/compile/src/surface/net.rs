@@ -110,7 +110,8 @@ mod tests {
 
     #[test]
     fn faces_keep_their_corners_and_polylines_become_cords() {
-        let text = "o net\nv 0 0 0\nv 1 0 0 # a corner\nv 1 1 0\nv 0 1 0\nf 1/1 2//2 3/3/3 \\\n -1\nl 1 3 4 # two\n";
+        let text =
+            "o net\nv 0 0 0\nv 1 0 0 # a corner\nv 1 1 0\nv 0 1 0\nf 1/1 2//2 3/3/3 \\\n -1\nl 1 3 4 # two\n";
         let net = parse(text).expect("a net");
         assert_eq!(net.faces, [[0, 1, 2, 3]]);
         assert_eq!(net.cords, [[0, 2], [2, 3]]);

@@ -198,7 +198,8 @@ pub fn lets_go(model: &Model) -> bool {
 
 /// True if a model may let out a gas (`@S`).
 pub fn lets_out(model: &Model) -> bool {
-    !model.scenery.gases.is_empty() && Command::that_hold(|command| command == Command::Source, model).contains(&true)
+    !model.scenery.gases.is_empty()
+        && Command::that_hold(|command| command == Command::Source, model).contains(&true)
 }
 
 /// The kinds of a model that place a sheet, themselves or in what they are drawn as, by [`KindId::index`].

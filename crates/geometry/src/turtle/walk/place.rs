@@ -8,8 +8,8 @@ use super::super::skeleton::Origin;
 use super::super::{Error, Pose};
 use super::{DrawnModule, Outline, Walk};
 use crate::scene::{
-    GasSource, MaterialId, Patch, Placement, Point, Polygon, Seedling, Shape, SheetKey, SheetPlace, SourceKey,
-    Surface, Vector,
+    GasSource, MaterialId, Patch, Placement, Point, Polygon, Seedling, Shape, SheetKey, SheetPlace,
+    SourceKey, Surface, Vector,
 };
 
 impl Walk<'_> {
