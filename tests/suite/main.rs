@@ -46,6 +46,7 @@ mod scenes;
 mod schedulers;
 mod semantics;
 mod shadows;
+mod sheets;
 mod signals;
 mod small_plants;
 mod solids;

@@ -16,7 +16,9 @@ use crate::scene_checks::MaterialNumber;
 use crate::scenery::Nesting;
 use crate::scope::{Scope, Variables};
 use crate::strain::{self, Strains};
-use crate::{Setting, appearance, check, contexts, dead_rules, globals, porting, scene_checks, scenery};
+use crate::{
+    Setting, appearance, check, contexts, dead_rules, globals, porting, scene_checks, scenery, sheets,
+};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
     Appearance, DRAWN_WORDS, Frames, Interpretation, KindId, Kinds, Model, Parameter, Scenery, Successor,
@@ -60,6 +62,7 @@ pub fn build(
         let is_used = |name: &str| kinds.iter().any(|(_, kind)| kind.name == name);
         appearance::unused_surfaces(&appearance, is_used, scope);
         scenery::unused_plants(&scenery, is_used, scope);
+        sheets::unused(&scenery, is_used, scope);
     }
     if parts.faulty || unread {
         return None;
@@ -253,6 +256,7 @@ impl<'d> Parts<'d> {
         scene_checks::tissues(&model, &all, &places.materials, diagnostics);
         scene_checks::gases(&model, &all, &places.materials, diagnostics);
         scene_checks::gases_of_plants(&model, diagnostics);
+        sheets::modules(&model, &all, diagnostics);
         scene_checks::solids(&model, occurs, drawn, diagnostics);
         check::commands(&model, diagnostics, &all);
         check::surface_sizes(&model, diagnostics, &all);

@@ -298,6 +298,7 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
                     || kind.base() == ELASTIC
                     || kind.base() == SOURCE
                     || model.scenery.plants.iter().any(|plant| plant.name == name)
+                    || model.scenery.sheets.iter().any(|sheet| sheet.name == name)
                     || model.appearance.surfaces.iter().any(|shape| shape.name == name) => {}
             Class::Surface => diagnostics.push(
                 Diagnostic::warning(format!("there is no surface `{name}`: nothing is drawn for it"))

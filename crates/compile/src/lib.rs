@@ -36,6 +36,7 @@ mod rules;
 mod scene_checks;
 mod scenery;
 mod scope;
+mod sheets;
 mod smooth;
 mod soils;
 mod strain;

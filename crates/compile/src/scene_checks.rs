@@ -22,6 +22,7 @@ pub fn is_hidden(model: &Model, kind: &Kind) -> bool {
     kind.interpretation.is_some()
         || model.appearance.surfaces.iter().any(|shape| shape.name == kind.name)
         || model.scenery.plants.iter().any(|plant| plant.name == kind.name)
+        || model.scenery.sheets.iter().any(|sheet| sheet.name == kind.name)
 }
 
 /// Reports `@G` in a model without a ground.

@@ -1,4 +1,4 @@
-//! The declarations of a scene: plants of other models, light, sky, camera and floor; wind and tissues are in `physics.rs`.
+//! The declarations of a scene: plants of other models, light, sky, camera and floor; wind and tissues are in `physics.rs`, sheets in `sheets.rs`.
 //! From the syntax tree to the model.
 
 use std::cell::Cell;
@@ -100,6 +100,12 @@ pub(crate) fn build(
         }
     }
     builder.end_soils();
+    // They name tissues, which may stand behind them.
+    for (item, span) in &document.items {
+        if let Item::Sheet { name, file, tissue, pinned } = item {
+            builder.sheet((name, file, tissue, *pinned), *span, appearance);
+        }
+    }
     builder.scenery
 }
 

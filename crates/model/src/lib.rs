@@ -42,6 +42,7 @@ mod picture;
 mod remedy;
 mod rule;
 mod scenery;
+mod sheet;
 mod soil;
 mod solution_form;
 mod stepping;
@@ -64,6 +65,7 @@ pub use picture::{Drawn, Footprint, Picture, Texture};
 pub use remedy::{Boundary, Remedy};
 pub use rule::{Interpretation, Outcome, Pattern, Produce, Rule, Solve, Switch};
 pub use scenery::{Camera, Plant, Scenery};
+pub use sheet::Sheet;
 pub use soil::{Bed, HeightGrid, Pour, Relief, Soil, SoilBase};
 pub use solution_form::{
     AffineSum, DrivenGrowth, GrowthLaw, Jacobian, LinearRates, Numeric, Obstacle, SolutionForm, ZeroCrossing,

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::{Bed, FieldCache, Flow, Gas, KindId, Model, Pour, Rgb, Soil, Tissue, Units, Wind};
+use crate::{Bed, FieldCache, Flow, Gas, KindId, Model, Pour, Rgb, Sheet, Soil, Tissue, Units, Wind};
 use dlsys_diagnostic::{Source, Span};
 use dlsys_expr::Program;
 
 /// The declarations of a model that concern its surroundings: `plant`, `light`, `sky`, `camera`, `ground`, `units`, `wind`, `flow`,
-/// `tissue`, `gas`, `solid`, `shelf`, `soil`, `pour`.
+/// `tissue`, `gas`, `sheet`, `solid`, `shelf`, `soil`, `pour`.
 #[derive(Clone, Debug, Default)]
 pub struct Scenery {
     /// In the order written.
@@ -30,6 +30,8 @@ pub struct Scenery {
     pub tissues: Vec<Tissue>,
     /// In the order written; their names stand for their numbers, from 1.
     pub gases: Vec<Gas>,
+    /// Flexible surfaces and nets, in the order written.
+    pub sheets: Vec<Arc<Sheet>>,
     /// The kinds of modules whose drawings are solid bodies, in the order written, with the places of their names.
     pub solids: Vec<(KindId, Span)>,
     /// The kinds of modules whose drawings carry what falls on them, likewise.

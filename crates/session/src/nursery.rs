@@ -22,7 +22,7 @@ use dlsys_geometry::turtle::{self, Strains};
 use dlsys_model::{self as model, Model};
 use dlsys_sim::{self as sim, Settings, Simulation, brief};
 use dlsys_surround::{
-    self as surround, Classes, Gases, Motion, Passive as Following, Place, Terrain, Weather,
+    self as surround, Classes, Gases, Motion, Passive as Following, Place, Sheets, Terrain, Weather,
 };
 use dlsys_tree::ModuleString;
 
@@ -110,6 +110,7 @@ struct Passive<'m> {
     around: Around<'m>,
     motion: Option<Motion<'m>>,
     gases: Option<Gases<'m>>,
+    sheets: Option<Sheets<'m>>,
     terrain: Option<Terrain<'m>>,
 }
 
@@ -193,7 +194,7 @@ impl<'m> Nursery<'m> {
     /// # Errors
     /// A module that cannot be drawn, or a plant whose run or drawing fails.
     pub fn draw(&self, string: &ModuleString, scene: &mut Scene) -> Result<(), DrawError> {
-        let Passive { around, motion, gases, terrain } = self.passive()?;
+        let Passive { around, motion, gases, sheets, terrain } = self.passive()?;
         // They read the motion of stems at ticks before.
         let gases = match gases {
             Some(gases) => gases.at(string.time, motion.as_ref())?,
@@ -210,6 +211,9 @@ impl<'m> Nursery<'m> {
         let strains = bent.as_ref().map(|bent| bent as &dyn Strains);
         self.draw_with((self.settings.seed, around), string, strains, scene)?;
         scene.gases = gases;
+        if let Some(sheets) = sheets {
+            sheets.draw(string.time, scene)?;
+        }
         if let Some(ground) = ground {
             scene.add_terrain(ground);
         }
@@ -229,11 +233,12 @@ impl<'m> Nursery<'m> {
                 true => Gases::new(model, self.settings, weather, self.threads)?,
                 false => None,
             };
+            let sheets = Sheets::new(model, self.settings)?;
             let terrain = match self.has_ground {
                 true => Terrain::new(model, self.settings, self.threads)?,
                 false => None,
             };
-            Ok(Passive { around, motion, gases, terrain })
+            Ok(Passive { around, motion, gases, sheets, terrain })
         };
         self.passive.get_or_init(start).as_ref().map_err(Clone::clone)
     }

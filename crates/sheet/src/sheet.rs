@@ -144,6 +144,13 @@ impl Sheet {
         }
     }
 
+    /// The same, held at those of its points for which `pinned` is true; points beyond its end are free.
+    pub fn pinned_at(mut self, pinned: &[bool]) -> Sheet {
+        let values = pinned.iter().copied().chain(std::iter::repeat(false));
+        self.pinned.iter_mut().zip(values).for_each(|(held, value)| *held = value);
+        self
+    }
+
     /// Number of points.
     pub fn len(&self) -> usize {
         self.rest.len()

@@ -6,6 +6,7 @@ use dlsys_gas as gas;
 use dlsys_geometry::turtle;
 use dlsys_ground as ground;
 use dlsys_model::Model;
+use dlsys_sheet as sheet;
 use dlsys_sim::{self as sim, brief};
 use dlsys_sway as sway;
 use dlsys_tree::Lineage;
@@ -100,7 +101,7 @@ pub enum Error {
         span: Span,
     },
     /// A body that bends or falls, so that its place depends on the wind that it would push.
-    #[error("the body of `{kind}` (module {lineage}) cannot push the wind: it {}", if *.falls { "falls" } else { "bends in it" })]
+    #[error("the body of `{kind}` (module {lineage}) cannot {}: it {}", if *.meets { "meet sheets" } else { "push the wind" }, if *.falls { "falls" } else { "bends in it" })]
     PassiveSolid {
         /// Name of the kind of the module.
         kind: String,
@@ -108,6 +109,8 @@ pub enum Error {
         lineage: Lineage,
         /// It is let go; otherwise it stands on stems that give way, or holds one.
         falls: bool,
+        /// It is one that sheets would meet; otherwise one that would push the wind.
+        meets: bool,
         /// The time in units of the model.
         time: f64,
         /// Its name in the declaration.
@@ -161,6 +164,28 @@ pub enum Error {
         /// The time in units of the model.
         time: f64,
         /// The declaration.
+        span: Span,
+    },
+    /// A sheet cannot be made, or cannot be followed.
+    #[error("the sheet `{name}` cannot be followed at t = {}: {error}", brief(*.time, 8))]
+    Sheet {
+        /// Its name.
+        name: String,
+        /// The reason.
+        error: sheet::Error,
+        /// The time in units of the model.
+        time: f64,
+        /// The place in the text that places it, or the declaration.
+        span: Span,
+    },
+    /// Too many points of sheets.
+    #[error("sheets have more than {most} points at t = {}", brief(*.time, 8))]
+    TooManySheets {
+        /// The largest number.
+        most: usize,
+        /// The time in units of the model.
+        time: f64,
+        /// The place in the text of the first one beyond.
         span: Span,
     },
     /// Too many parts are let go.
@@ -264,9 +289,12 @@ impl Error {
             ))
             .at(*span, "it follows t")
             .help("Young's modulus is greater than 0 and at most 1e15 Pa at all times that are computed"),
-            Error::PassiveSolid { falls, time, span, .. } => Diagnostic::error(self.to_string())
+            Error::PassiveSolid { falls, meets, time, span, .. } => Diagnostic::error(self.to_string())
                 .at(*span, format!("declared here, and drawn at t = {}", brief(*time, 8)))
-                .note("the wind is pushed by bodies that the equations of the model move")
+                .note(match meets {
+                    true => "sheets meet bodies that the equations of the model move",
+                    false => "the wind is pushed by bodies that the equations of the model move",
+                })
                 .help(match falls {
                     true => "give what is let go a module of its own that is not `solid`",
                     false => "draw the body outside the branch of `@E`, or take its name out of `solid`",
@@ -280,6 +308,13 @@ impl Error {
                     .at(*span, "of this name is the first one beyond")
                     .help("draw several bodies in one module, or name fewer modules")
             }
+            Error::Sheet { error, span, .. } => {
+                let diagnostic = Diagnostic::error(self.to_string()).at(*span, "it is placed here");
+                sheet_advice(error, diagnostic)
+            }
+            Error::TooManySheets { span, .. } => Diagnostic::error(self.to_string())
+                .at(*span, "this one is too many")
+                .help("place fewer sheets, or give them coarser meshes: 1,000 points make a smooth flag"),
             Error::Gas { name, error: gas::Error::Blobs { most, .. }, time, span } => Diagnostic::error(format!(
                 "the gas `{name}` has more than {most} blobs at t = {}",
                 brief(*time, 8)
@@ -449,6 +484,27 @@ fn help_on_ground(error: &ground::Error) -> (&'static str, &'static str) {
 fn falling(error: &fall::Error, part: &FallingPart, time: f64) -> String {
     let FallingPart { kind, lineage, .. } = part;
     format!("what `{kind}` (module {lineage}) lets go cannot be followed at t = {}: {error}", brief(time, 8))
+}
+
+/// Remedies for a sheet that cannot be followed.
+fn sheet_advice(error: &sheet::Error, diagnostic: Diagnostic) -> Diagnostic {
+    let cause = match error {
+        sheet::Error::Step { cause, .. } | sheet::Error::Steps { cause, .. } => cause,
+        sheet::Error::Value { .. } => {
+            return diagnostic.help("look at the values of its tissue, and at its size in `units`");
+        }
+        _ => &sheet::Rejection::None,
+    };
+    match cause {
+        sheet::Rejection::Deep { .. } => diagnostic
+            .help("a solid squeezes it against another one or against the ground, or drives it farther than it stretches: give it way"),
+        sheet::Rejection::Fast { .. } => {
+            diagnostic.help("a solid is too fast or too thin: nothing may pass through a sheet within a step")
+        }
+        _ => diagnostic
+            .help("look at the `units`, at the thickness and stiffness of its tissue, and at the speed of the wind")
+            .help("`--bend-tolerance 0.01` allows larger errors than the default 0.001"),
+    }
 }
 
 impl From<sim::Error> for Error {

@@ -1,4 +1,4 @@
-//! The surroundings of a growing plant: wind, the stems that bend in it, what is let go and falls, gases, and ground that gives way.
+//! The surroundings of a growing plant: wind, the stems that bend in it, what is let go and falls, gases, sheets, and ground that gives way.
 //!
 //! ```text
 //! growth (sim) ──string──▶ turtle ──skeleton──▶ body ──▶ stems in the wind (sway, wind) ──strains──▶ turtle ──▶ scene
@@ -13,6 +13,7 @@
 //! - [`Survey`]: axes of a string with their natural frequencies, before anything is simulated.
 //! - [`Classes`]: modes by which plants move that are small in the picture.
 //! - [`Gases`]: smoke, steam and pollen at any time.
+//! - [`Sheets`]: flexible surfaces and nets at any time.
 //! - [`Loose`]: what is let go, as a body.
 //! - [`Terrain`]: ground that gives way, at any time.
 //! - [`Motion`]: the stems and the flights of a model at any time, as [`BentStems`] for [`draw_bent`](dlsys_geometry::turtle::draw_bent).
@@ -29,12 +30,15 @@ mod drift;
 mod error;
 mod flights;
 mod gases;
+mod hanging;
 mod loose;
 mod motion;
 mod outlets;
+mod paths;
 mod place;
 mod points;
 mod pressing;
+mod sheets;
 mod solids;
 mod survey;
 mod terrain;
@@ -45,12 +49,17 @@ pub use classes::{ByModes, Classes};
 pub use coupled::start;
 pub use error::{Error, FailedStem, FallingPart};
 pub use gases::{Gases, MOST_BLOBS, TICK as GAS_TICK};
+pub use hanging::TICK as SHEET_TICK;
 pub use loose::Loose;
 pub use motion::{MOST_TICKS, Motion, Passive};
 pub use place::Place;
+pub use sheets::Sheets;
 pub use survey::{Axis, Survey, Vibration, moves};
 pub use terrain::{TICKS as GROUND_TICKS, Terrain, TerrainReport};
 pub use weather::{Sampler, Weather};
+
+/// Most points of all sheets of a scene.
+pub const MOST_SHEET_POINTS: usize = 1_000_000;
 
 /// Seconds from one tick of the clock to the next.
 pub const CLOCK: f64 = 1.0 / 30.0;

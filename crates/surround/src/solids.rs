@@ -29,7 +29,7 @@ use crate::{CLOCK, Error};
 /// Instants in a tick.
 const PARTS: f64 = 4.0;
 /// Most bodies at one instant: each place in the wind is compared with all of them.
-const MOST_BODIES: usize = 1000;
+pub(crate) const MOST_BODIES: usize = 1000;
 /// Most points of the instants that are kept, each of which counts as one more.
 const MOST_KEPT: usize = 200_000;
 /// Directions in which the outermost point of a body with many points is a corner of its hull.
@@ -186,7 +186,15 @@ impl Track<'_> {
                 let kind = solids.model.kinds.get(solid.origin.kind).name.clone();
                 let (span, lineage) = (self.span(solids, solid), solid.origin.lineage);
                 let falls = passive == Passive::Falls;
-                return Err(Error::PassiveSolid { kind, lineage, falls, time: self.string.time, span });
+                let meets = false;
+                return Err(Error::PassiveSolid {
+                    kind,
+                    lineage,
+                    falls,
+                    meets,
+                    time: self.string.time,
+                    span,
+                });
             }
             let id = solid.origin.lineage.id;
             let before = descent.line(id).find_map(|id| known.get(&id).copied());
@@ -245,8 +253,14 @@ impl Body {
     }
 }
 
-/// The hull of balls. Those that are larger than the smallest one are points all around them.
+/// The hull of balls.
 fn hull(balls: &[(Vector3<f64>, f64)]) -> Option<Hull> {
+    let (points, rounding) = rounded(balls);
+    Hull::new(points, rounding)
+}
+
+/// The hull of balls as points with one radius. Balls that are larger than the smallest one are points all around them.
+pub(crate) fn rounded(balls: &[(Vector3<f64>, f64)]) -> (Vec<Vector3<f64>>, f64) {
     let count = balls.len() as f64;
     let middle = balls.iter().map(|(point, _)| point).sum::<Vector3<f64>>() / count;
     let extent = balls.iter().map(|(p, radius)| (p - middle).norm() + radius).fold(0.0, f64::max);
@@ -260,11 +274,11 @@ fn hull(balls: &[(Vector3<f64>, f64)]) -> Option<Hull> {
             points.extend(directions(BALL_POINTS).map(|way| centre + way * (radius - rounding)));
         }
     }
-    Hull::new(points, rounding)
+    (points, rounding)
 }
 
 /// The points of a drawing that are corners of its hull: all of them if they are few, otherwise the outermost ones in directions all around.
-fn corners(points: &[(Vector3<f64>, f64)]) -> Arc<[usize]> {
+pub(crate) fn corners(points: &[(Vector3<f64>, f64)]) -> Arc<[usize]> {
     if points.len() <= DIRECTIONS {
         return (0..points.len()).collect();
     }

@@ -122,6 +122,19 @@ impl<'m> Weather<'m> {
         Ok(Some(Arc::new(Weather { declared, solids, recent: Recent::default() })))
     }
 
+    /// The wind and the flows that a model declares, whatever bodies it has; `None` if it declares neither.
+    ///
+    /// # Errors
+    /// A value that is out of range, with the place of its declaration.
+    pub(crate) fn around_bodies(scenery: &Scenery) -> Result<Option<Arc<Weather<'static>>>, Error> {
+        if scenery.wind.is_none() && scenery.flows.is_empty() {
+            return Ok(None);
+        }
+        let declared = Declared::of(scenery)?;
+        let weather = |declared| Arc::new(Weather { declared, solids: None, recent: Recent::default() });
+        Ok(declared.map(weather))
+    }
+
     /// The wind of a model whose rules read `strain`, which has no bodies.
     pub(crate) fn without_solids(scenery: &Scenery) -> Result<Option<Arc<Weather<'static>>>, Error> {
         if let Some((_, span)) = scenery.solids.first() {

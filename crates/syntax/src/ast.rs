@@ -338,6 +338,17 @@ pub enum Item {
         /// Its colours, as `#rrggbb` or `#rgb`: more than one is an error.
         colors: Vec<Text>,
     },
+    /// `sheet @name from "file" of tissue pinned condition`: a flexible surface or net, which the module `@name` places.
+    Sheet {
+        /// The name with its mark.
+        name: Name,
+        /// The path of the mesh, relative to the folder of the model.
+        file: Text,
+        /// The name of its tissue.
+        tissue: Name,
+        /// The condition over x, y and z, in the file's coordinates, under which a point is held.
+        pinned: Expression,
+    },
     /// `solid names`: the modules whose drawings are solid bodies.
     Solid(Vec<Name>),
     /// `shelf names`: the modules whose drawings carry what falls on them.
@@ -413,6 +424,7 @@ impl Item {
             Item::Flow { .. } => "flow",
             Item::Tissue { .. } => "tissue",
             Item::Gas { .. } => "gas",
+            Item::Sheet { .. } => "sheet",
             Item::Solid(_) => "solid",
             Item::Shelf(_) => "shelf",
             Item::Soil { .. } => "soil",
@@ -440,6 +452,7 @@ impl Item {
             | Item::Gradient { name, .. }
             | Item::Surface { name, .. }
             | Item::Plant { name, .. }
+            | Item::Sheet { name, .. }
             | Item::Tissue { name, .. }
             | Item::Gas { name, .. }
             | Item::Soil { name, .. }

@@ -73,7 +73,7 @@ const fn row(word: &'static str, rule: Rule) -> Declaration {
 }
 
 /// All declarations, in the order in which messages list them.
-pub static DECLARATIONS: [Declaration; 34] = [
+pub static DECLARATIONS: [Declaration; 35] = [
     Declaration {
         usage: "\"…\"",
         summary: "the title of the model, shown above its pictures",
@@ -349,6 +349,21 @@ pub static DECLARATIONS: [Declaration; 34] = [
         begins: Begins::BeforeValue,
         written: "a gas is written `gas steam = size 0.01, mass 1e-6, extinction 200, diffusion 1e-4, decay 0.5, fall -0.3`",
         ..row("gas", Rule::gas_item)
+    },
+    Declaration {
+        usage: "@NAME from \"FILE\" of TISSUE pinned CONDITION",
+        summary: "a flexible surface or net from a mesh (.obj), held where the condition on x, y and z is true",
+        category: Category::Scene,
+        named: Named::Surface,
+        repeats: Repeats::PerName("surface"),
+        options: &[
+            option("from", Follow::Text),
+            option("of", Follow::Value),
+            option("pinned", Follow::Value),
+        ],
+        begins: Begins::BeforeValue,
+        written: "a sheet is written `sheet @Flag from \"flag.obj\" of cloth pinned x < 0.01`",
+        ..row("sheet", Rule::sheet_item)
     },
     Declaration {
         usage: "NAME …",

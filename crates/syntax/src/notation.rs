@@ -84,6 +84,12 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
             let (attributes, colors) = parts.values_and_colors()?;
             Item::Gas { name, attributes, colors }
         }
+        Rule::sheet_item => Item::Sheet {
+            name: parts.name(),
+            file: parts.text(),
+            tissue: parts.name(),
+            pinned: parts.expression()?,
+        },
         Rule::solid_item => Item::Solid(parts.names()),
         Rule::shelf_item => Item::Shelf(parts.names()),
         Rule::soil_item => {
@@ -183,6 +189,9 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
         }
         Item::Gas { name, attributes, colors } => {
             format!("gas {} = {}", name.text, colored(expressions, attributes, colors))
+        }
+        Item::Sheet { name, file, tissue, pinned } => {
+            format!("sheet {} from \"{}\" of {} pinned {}", name.text, file.text, tissue.text, show(pinned))
         }
         Item::Solid(list) => format!("solid {}", print::names(list, " ")),
         Item::Shelf(list) => format!("shelf {}", print::names(list, " ")),

@@ -42,6 +42,7 @@ mod given;
 mod ground;
 mod plan;
 mod scene;
+mod sheet;
 #[cfg(test)]
 mod tests;
 mod text;

@@ -8,6 +8,7 @@ use super::falling::FallingPlan;
 use super::gas;
 use super::ground;
 use super::scene::{self, ScenePart};
+use super::sheet;
 use super::{given, words};
 use crate::diagnostic::Source;
 use crate::model::{
@@ -192,6 +193,7 @@ impl Explanation {
         scene.extend(falling.iter().map(|falling| falling.row.clone()));
         scene.extend(gas::parts(model));
         scene.extend(ground::part(model));
+        scene.extend(sheet::parts(model));
         Explanation {
             model: session.source.name.clone(),
             title: model.title.clone(),

@@ -76,15 +76,21 @@ fn solid(model: &Model) -> Option<ScenePart> {
         model.scenery.solids.iter().map(|(kind, _)| &*model.kinds.get(*kind).name).collect();
     names.dedup();
     let part = format!("solid {}", names.join(" "));
-    match (names.is_empty(), sways(model) || turtle::lets_out(model)) {
+    match (names.is_empty(), sways(model) || turtle::lets_out(model) || turtle::drapes(model)) {
         (true, _) => None,
         (_, false) => {
-            let why = "nothing in the scene feels the wind: no stem gives way, nothing is let go, and there is no gas";
+            let why = "nothing in the scene feels the wind: no stem gives way, nothing is let go, and there is no gas or sheet";
             Some(ScenePart::new(part, "nothing to do", why))
         }
         (_, true) => {
-            let why = "the wind flows around the convex hull of each body; their places are those of growth at 120 instants a second, \
+            let around = "the wind flows around the convex hull of each body; their places are those of growth at 120 instants a second, \
                 with straight lines in between";
+            let met = "sheets meet the convex hull of each body on the way on which the equations of the model lead it";
+            let why = match (sways(model) || turtle::lets_out(model), turtle::drapes(model)) {
+                (true, true) => format!("{around}; {met}"),
+                (true, false) => around.to_owned(),
+                (false, _) => met.to_owned(),
+            };
             Some(ScenePart::new(part, "in steps", why))
         }
     }

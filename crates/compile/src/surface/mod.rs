@@ -5,11 +5,13 @@
 
 mod materials;
 mod mesh;
+mod net;
 mod patches;
 mod picture;
 
 use std::path::Path;
 
+pub use net::{Net, read as read_net};
 pub use picture::{read as read_picture, within_limit};
 
 use dlsys_model::SurfaceShape;

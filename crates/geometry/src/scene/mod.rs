@@ -9,6 +9,7 @@
 //! - [`Polygon`]: a filled outline. [`Surface`]: a [`Mesh`] placed in space; many share one mesh.
 //! - [`Patch`]: a bicubic Bézier patch. [`PatchSet`]: a surface of patches, or a ball. [`Scene::tessellated`] makes meshes of them.
 //! - [`Gas`]: smoke, steam or pollen as blobs. [`GasSource`]: where they begin.
+//! - [`SheetPlace`]: where a module places a flexible surface or net.
 //! - [`Owner`]: the module that drew an element. Its name is the same in every frame.
 //! - [`Plant`]: the scene of another model, placed in this one. [`Surroundings`]: light, sky, camera and floor.
 //! - [`Bounds`]: the bounds of a scene, or of all scenes of an animation.
@@ -26,6 +27,7 @@ mod material;
 mod mesh;
 mod patch;
 mod pieces;
+mod sheet;
 mod surroundings;
 
 pub use bounds::Bounds;
@@ -36,6 +38,7 @@ pub use gas::{Blob, Gas, GasSource, SourceKey};
 pub use material::{Color, GRADIENT_STEPS, Material, MaterialId, Palette};
 pub use mesh::{Face, Mesh};
 pub use patch::{Net, Patch, PatchFace, PatchSet};
+pub use sheet::{SheetKey, SheetPlace};
 pub use surroundings::{Plant, Seedling, Surroundings, Viewpoint};
 
 use std::borrow::Cow;
@@ -143,6 +146,8 @@ pub struct Scene {
     pub gases: Vec<Gas>,
     /// The owner of the surface that is ground of soil, if there is one. It is seen in every frame; framing ignores it.
     pub terrain: Option<OwnerId>,
+    /// Where modules place sheets, in string order; the sheets themselves are among the other elements once they are drawn.
+    pub sheets: Vec<SheetPlace>,
     /// Plants of other models that are to be drawn, in string order; empty once they are among `plants`.
     pub seedlings: Vec<Seedling>,
     /// Plants of other models, in string order.
@@ -185,6 +190,7 @@ impl Scene {
         self.sources.clear();
         self.gases.clear();
         self.terrain = None;
+        self.sheets.clear();
         self.seedlings.clear();
         self.plants.clear();
         self.surroundings = Surroundings::default();

@@ -56,6 +56,8 @@ pub(super) enum Command {
     Surface(usize),
     /// A plant of another model, by its index among those that the model declares.
     Plant(usize),
+    /// A sheet, by its index among those that the model declares.
+    Sheet(usize),
     /// `@S(n, rate, radius)`: blobs of gas `n` begin here.
     Source,
     /// `@D`: what follows is free.
@@ -88,6 +90,9 @@ impl Command {
         }
         if let Some(plant) = model.scenery.plants.iter().position(|plant| plant.name == kind.name) {
             return Command::Plant(plant);
+        }
+        if let Some(sheet) = model.scenery.sheets.iter().position(|sheet| sheet.name == kind.name) {
+            return Command::Sheet(sheet);
         }
         match kind.base() {
             "F" => Command::Draw,
@@ -133,12 +138,12 @@ impl Command {
     }
 
     /// The kinds of a model that hold a command, themselves or in what they are drawn as, by the kinds' index.
-    pub(super) fn that_hold(sought: Command, model: &Model) -> Vec<bool> {
+    pub(super) fn that_hold(sought: impl Fn(Command) -> bool, model: &Model) -> Vec<bool> {
         let table = Command::table(model);
-        let mut holders: Vec<bool> = table.iter().map(|command| *command == sought).collect();
+        let mut holders: Vec<bool> = table.iter().map(|command| sought(*command)).collect();
         let holds = |holders: &[bool], drawn: KindId| {
             // Inside its own drawing a module is what its name says.
-            holders[drawn.index()] || Command::plain(model.kinds.get(drawn), model) == sought
+            holders[drawn.index()] || sought(Command::plain(model.kinds.get(drawn), model))
         };
         loop {
             let before = holders.clone();

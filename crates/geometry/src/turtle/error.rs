@@ -73,6 +73,9 @@ pub enum ErrorKind {
     /// A plant of another model behind `@D`.
     #[error("it lets go of a plant of another model")]
     FreePlant,
+    /// A sheet behind `@D`.
+    #[error("it lets go of a sheet")]
+    FreeSheet,
     /// More patches have been begun than a frame may have.
     #[error("it begins more patches than a frame may have")]
     TooManyPatches,
@@ -110,6 +113,9 @@ impl ErrorKind {
             }
             ErrorKind::FreePlant => {
                 "a plant of another model stands where it is: draw what falls with modules of this model".to_owned()
+            }
+            ErrorKind::FreeSheet => {
+                "a sheet is held where its `pinned` says: place it outside the branch of `@D`".to_owned()
             }
             ErrorKind::TooManyPatches => {
                 "use the number of a patch again when it is drawn: `@PS(1)` forgets the patch 1 that was there".to_owned()

@@ -27,6 +27,7 @@
 //! | `@O(d)` | a ball of diameter `d` (1) around the turtle |
 //! | `@L(w, l, h)` | the same for each surface: its width (to the left), length (along the heading) and height (up) in parts of its own; `@L(w, l)` is `@L(w, l, l)` |
 //! | `@NAME(b, s)` | a plant of another model, declared by `plant @NAME from …`, as it is at its time t - b; `s` is its seed |
+//! | `@NAME` | a sheet, declared by `sheet @NAME from …`, whose coordinates are the turtle's: `x` to the right, `y` along the heading, `z` up |
 //! | `@D` | what follows, to the end of the branch, is free since the birth of the module that holds it: it falls, flutters, lands |
 //! | `@G` | the turtle is set down on the ground; `x`, `z` and its directions stay |
 //! | `@PS(n)` `@PC(n, r, c)` `@PD(n)` | begin Bézier patch `n`; make the position its control point in row `r` and column `c` (0 to 3); draw it, when all 16 are there. Brackets do not matter to them |
@@ -204,7 +205,7 @@ pub fn bodies(
 
 /// The kinds of a model that hold an `@D`, themselves or in what they are drawn as, by [`KindId::index`].
 pub fn kinds_that_let_go(model: &Model) -> Vec<bool> {
-    Command::that_hold(Command::Detach, model)
+    Command::that_hold(|command| command == Command::Detach, model)
 }
 
 /// True if a model may let go of something (`@D`).
@@ -214,7 +215,18 @@ pub fn lets_go(model: &Model) -> bool {
 
 /// True if a model may let out a gas (`@S`).
 pub fn lets_out(model: &Model) -> bool {
-    !model.scenery.gases.is_empty() && Command::that_hold(Command::Source, model).contains(&true)
+    !model.scenery.gases.is_empty()
+        && Command::that_hold(|command| command == Command::Source, model).contains(&true)
+}
+
+/// The kinds of a model that place a sheet, themselves or in what they are drawn as, by [`KindId::index`].
+pub fn kinds_that_drape(model: &Model) -> Vec<bool> {
+    Command::that_hold(|command| matches!(command, Command::Sheet(_)), model)
+}
+
+/// True if a model may place a sheet.
+pub fn drapes(model: &Model) -> bool {
+    !model.scenery.sheets.is_empty() && kinds_that_drape(model).contains(&true)
 }
 
 /// The first place in the text of a model that writes an `@D`.

@@ -113,6 +113,8 @@ pub(super) struct Walk<'a> {
     solid: Option<usize>,
     /// Number of sources of gas that this module has drawn.
     sources_drawn: u32,
+    /// Number of sheets that this module has placed.
+    sheets_drawn: u32,
 }
 
 impl<'a> Walk<'a> {
@@ -161,6 +163,7 @@ impl<'a> Walk<'a> {
             parts_drawn: (0, 0),
             solid: None,
             sources_drawn: 0,
+            sheets_drawn: 0,
         }
     }
 
@@ -219,7 +222,7 @@ impl<'a> Walk<'a> {
         self.drawn = module;
         self.owner = None;
         (self.depth, self.stems_drawn, self.state.joined) = (self.stack.len(), 0, None);
-        (self.parts_drawn.0, self.sources_drawn) = (0, 0);
+        (self.parts_drawn.0, self.sources_drawn, self.sheets_drawn) = (0, 0, 0);
         self.solid = None;
         if let Some(recorder) = &mut self.recorder
             && recorder.solid_kinds.get(module.kind.index()) == Some(&true)
@@ -335,6 +338,7 @@ impl<'a> Walk<'a> {
                 }
             }
             Command::Plant(plant) => self.plant(plant, read)?,
+            Command::Sheet(sheet) => self.drape(sheet)?,
             Command::Source => self.let_out(read)?,
             Command::Detach => self.let_go(),
             Command::Ground => self.set_down(),

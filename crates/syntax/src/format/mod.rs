@@ -97,6 +97,10 @@ mod tests {
             ("param α_max=60.0 in 10..90#wide", "param α_max = 60.0 in 10 .. 90  #wide"),
             ("ignore F_x  @L + -", "ignore F_x @L + -"),
             ("surface @M  from\t\"m.s\"", "surface @M from \"m.s\""),
+            (
+                "sheet  @N from \"n.obj\"of  rope pinned y>2 & x<1",
+                "sheet @N from \"n.obj\" of rope pinned y > 2 & x < 1",
+            ),
             ("surface @M from \"m.s\"texture  \"m.png\"", "surface @M from \"m.s\" texture \"m.png\""),
             ("contour c=(1,0)(0,1) (-1, 0)", "contour c = (1, 0) (0, 1) (-1, 0)"),
             ("tropism 0,-1,0 strength 0.2", "tropism 0, -1, 0 strength 0.2"),

@@ -47,6 +47,8 @@ fn words(rule: Rule) -> Option<&'static str> {
         kw_in => "`in` and a range",
         kw_from => "`from` and a file",
         kw_texture => "`texture` and a picture",
+        kw_of => "`of` and a tissue",
+        kw_pinned => "`pinned` and a condition",
         surface_name => "the name of a surface such as `@P`",
         units_part | units_word => "`length` or `time` and a value",
         wind_part | wind_word | spectrum => "an option such as `speed`",

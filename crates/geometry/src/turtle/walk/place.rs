@@ -8,7 +8,8 @@ use super::super::skeleton::Origin;
 use super::super::{Error, Pose};
 use super::{DrawnModule, Outline, Walk};
 use crate::scene::{
-    GasSource, MaterialId, Patch, Placement, Point, Polygon, Seedling, Shape, SourceKey, Surface, Vector,
+    GasSource, MaterialId, Patch, Placement, Point, Polygon, Seedling, Shape, SheetKey, SheetPlace,
+    SourceKey, Surface, Vector,
 };
 
 impl Walk<'_> {
@@ -115,6 +116,22 @@ impl Walk<'_> {
         let placement = Placement::uniform(self.seen(self.state.position), [-left, heading, up], 1.0);
         let (seed, owner) = (parameters.get(1).copied(), self.owner());
         self.scene.seedlings.push(Seedling { plant, birth, age, seed, placement, owner });
+        Ok(())
+    }
+
+    /// Notes a sheet at the turtle's position. Its axes follow the turtle's, as those of a plant do.
+    pub(super) fn drape(&mut self, sheet: usize) -> Result<(), Error> {
+        if self.state.part.is_some() {
+            return Err(self.error(ErrorKind::FreeSheet));
+        }
+        let DrawnModule { kind, lineage } = self.drawn;
+        let key = SheetKey { module: lineage.id, number: self.sheets_drawn };
+        self.sheets_drawn += 1;
+        let [heading, left, up] = self.seen_axes();
+        let placement = Placement::uniform(self.seen(self.state.position), [-left, heading, up], 1.0);
+        let origin = Origin { kind, lineage, inside: self.inside };
+        let (tint, owner) = (self.chosen(), self.owner());
+        self.scene.sheets.push(SheetPlace { key, origin, sheet, placement, tint, owner });
         Ok(())
     }
 

@@ -1,0 +1,344 @@
+//! Sheets that hang in a scene, from tick to tick: where modules place them, and how they move among the solids of the model.
+//!
+//! ```text
+//! growth ──string at instants of the tick──▶ turtle ──births, solids──▶ solver (sheet, wind) ──▶ states at its steps
+//! ```
+//!
+//! A sheet begins at the birth of its module, at rest in the shape of its file, where the turtle stands then. It hangs on the descent of its
+//! module: a production that places it again changes nothing.
+
+use std::collections::HashSet;
+use std::sync::Arc;
+use std::time::Instant;
+
+use dlsys_geometry::scene::{Point, Scene, SheetKey, SheetPlace};
+use dlsys_geometry::turtle::{self, Origin};
+use dlsys_model::{Model, Tissue};
+use dlsys_sheet::{
+    self as sheet, Counts, Mesh, Place as Stand, Settings, Shape, Sheet, Solid, Solver, State, Step, Vector,
+};
+use dlsys_sim::{Passed, Simulation};
+use dlsys_tree::ModuleString;
+
+use crate::descent::Descent;
+use crate::paths::{INSTANTS, Path, Watch};
+use crate::place::Place;
+use crate::weather::{Gusts, Sampler};
+use crate::{Error, MOST_SHEET_POINTS};
+
+/// Seconds from one tick of the sheets to the next. A power of 2, so that its multiples are exact.
+pub const TICK: f64 = 1.0 / 64.0;
+
+/// A sheet that a module has placed.
+#[derive(Debug)]
+pub(crate) struct Hung {
+    pub(crate) key: SheetKey,
+    pub(crate) origin: Origin,
+    /// Its index among those that the model declares.
+    pub(crate) sheet: usize,
+    made: Arc<Sheet>,
+    /// When it begins, in s.
+    begin: f64,
+}
+
+/// A sheet from one tick to the next: its states at the ends of steps, and where it begins.
+#[derive(Clone, Debug)]
+pub(crate) struct Track {
+    pub(crate) hung: Arc<Hung>,
+    steps: Vec<(f64, State)>,
+}
+
+impl Track {
+    /// The state at a time in s; `None` before its birth.
+    pub(crate) fn at(&self, time: f64) -> Option<State> {
+        let first = self.steps.first().filter(|(begin, _)| *begin <= time)?;
+        let next = self.steps.partition_point(|(end, _)| *end < time);
+        let Some((to, after)) = self.steps.get(next) else {
+            return self.steps.last().map(|(_, last)| last.clone());
+        };
+        let (from, before) = if next == 0 { first } else { &self.steps[next - 1] };
+        Some(Step { from: *from, to: *to, before, after, pushes: &[], depths: &[] }.at(time))
+    }
+
+    fn points(&self) -> usize {
+        self.steps.len() * self.hung.made.len()
+    }
+}
+
+/// What happens to sheets from one tick to the next.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tick {
+    pub(crate) number: u64,
+    pub(crate) tracks: Vec<Track>,
+    pub(crate) descent: Descent,
+    /// Growth fails before the next tick; solids stand still until then.
+    pub(crate) failed: Option<Error>,
+}
+
+impl Tick {
+    /// Number of points that are kept, and one for itself.
+    pub(crate) fn size(&self) -> usize {
+        1 + self.tracks.iter().map(Track::points).sum::<usize>()
+    }
+}
+
+/// What growth does from one tick to the next.
+#[derive(Clone, Default)]
+pub(crate) struct View {
+    pub(crate) paths: Vec<Path>,
+    births: Vec<Arc<Hung>>,
+    pub(crate) descent: Descent,
+    /// The sheets of the string at the next tick, if they may have changed.
+    next: Option<Vec<SheetPlace>>,
+    pub(crate) failed: Option<Error>,
+}
+
+/// The sheets of a model at a tick, and its growth up to there.
+#[derive(Clone)]
+pub(crate) struct Hanging<'m> {
+    model: &'m Model,
+    pub(crate) place: Place,
+    pub(crate) growth: Simulation<'m>,
+    /// The number of the present tick.
+    pub(crate) number: u64,
+    /// In the order of their births.
+    hung: Vec<(Arc<Hung>, State)>,
+    /// The kinds that place sheets.
+    drapers: Arc<[bool]>,
+    /// A drawing that places a sheet may do so at one time and not at another.
+    chooses: bool,
+    wind: Arc<Sampler<'static>>,
+    solver: Solver,
+    scene: Scene,
+}
+
+impl<'m> Hanging<'m> {
+    /// The sheets at the first tick, with a tolerance relative to the extent of a sheet.
+    pub(crate) fn new(
+        model: &'m Model,
+        (growth, place): (Simulation<'m>, Place),
+        wind: Arc<Sampler<'static>>,
+        tolerance: f64,
+    ) -> Hanging<'m> {
+        let drapers: Arc<[bool]> = turtle::kinds_that_drape(model).into();
+        let chooses =
+            model.kinds.iter().any(|(id, kind)| drapers[id.index()] && kind.interpretation.is_some());
+        let tolerance = tolerance.clamp(1e-12, 0.1);
+        let solver = Solver::new(Settings { tolerance, longest: TICK, ..Settings::default() });
+        let (hung, scene) = (Vec::new(), turtle::blank(model));
+        Hanging { model, place, growth, number: 0, hung, drapers, chooses, wind, solver, scene }
+    }
+
+    /// Sets when the solver gives up.
+    pub(crate) fn give_up_at(&mut self, deadline: Option<Instant>) {
+        self.solver.deadline = deadline;
+    }
+
+    /// Work of the solver so far.
+    pub(crate) fn counts(&self) -> Counts {
+        self.solver.counts()
+    }
+
+    /// Points of all sheets at the tick.
+    pub(crate) fn points(&self) -> usize {
+        self.hung.iter().map(|(hung, _)| hung.made.len()).sum()
+    }
+
+    /// Seconds at the beginning of the present tick.
+    pub(crate) fn begin(&self) -> f64 {
+        self.number as f64 * TICK
+    }
+
+    /// Goes on to the next tick, with solids on the ways on which growth leads them.
+    ///
+    /// # Errors
+    /// A drawing fails, or a sheet cannot be followed.
+    pub(crate) fn tick(&mut self) -> Result<Tick, Error> {
+        let mut growth = self.growth.clone();
+        let view = self.look(&mut growth)?;
+        let tracks = self.solve(&view)?;
+        self.growth = growth;
+        self.end(view, tracks)
+    }
+
+    /// Lets growth go on to the next tick, and draws what sheets need on the way. Growth may fail there, after a time that is asked for.
+    ///
+    /// # Errors
+    /// A drawing fails, or a sheet cannot be made.
+    pub(crate) fn look(&mut self, growth: &mut Simulation<'m>) -> Result<View, Error> {
+        let mut view = View::default();
+        let mut watch = Watch::default();
+        let (mut string, mut scene) = (ModuleString::default(), std::mem::take(&mut self.scene));
+        let mut seen = false;
+        for (instant, part) in INSTANTS.into_iter().enumerate() {
+            let time = self.place.time_at(self.begin() + TICK * part);
+            match self.pass(growth, time, (&mut string, &mut scene), &mut view) {
+                Ok(changed) => seen |= changed,
+                Err(error @ Error::Growth(_)) => {
+                    view.failed = Some(error);
+                    break;
+                }
+                Err(error) => return Err(error),
+            }
+            let around = (self.model, &self.place);
+            watch.note((instant, &string), around, &view.descent, &mut scene)?;
+        }
+        view.paths = watch.paths(self.begin(), TICK);
+        if view.failed.is_none() && (seen || self.chooses) {
+            scene.clear();
+            turtle::draw(self.model, &string, &mut scene)?;
+            self.find_new((&scene, self.begin() + TICK), &mut view)?;
+            view.next = Some(std::mem::take(&mut scene.sheets));
+        }
+        self.scene = scene;
+        Ok(view)
+    }
+
+    /// Lets growth go on to a time, with a stop at each production that may place a sheet. True if there were productions.
+    fn pass(
+        &mut self,
+        growth: &mut Simulation<'m>,
+        time: f64,
+        (string, scene): (&mut ModuleString, &mut Scene),
+        view: &mut View,
+    ) -> Result<bool, Error> {
+        let mut changed = false;
+        let mut look = |now: f64, growth: &mut Simulation<'m>, view: &mut View| {
+            growth.at(now, string)?;
+            scene.clear();
+            turtle::draw(self.model, string, scene)?;
+            self.find_new((scene, self.place.seconds(now)), view)
+        };
+        if self.number == 0 && time <= self.place.time_at(0.0) {
+            growth.at(time, &mut ModuleString::default())?;
+            view.descent.add(self.model, &growth.take_events());
+            look(time, growth, view)?;
+            return Ok(true);
+        }
+        while growth.pass_some(time, usize::MAX, true)? != Passed::All {
+            let events = growth.take_events();
+            changed |= !events.is_empty();
+            view.descent.add(self.model, &events);
+            let places_one = |event: &dlsys_sim::Event| {
+                let successors = &self.model.rules[event.rule].produces[event.clause].outcome.successors;
+                successors.iter().any(|string| string.kinds().any(|kind| self.drapers[kind.index()]))
+            };
+            if events.iter().any(places_one) {
+                look(growth.reached(), growth, view)?;
+            }
+        }
+        growth.at(time, string)?;
+        let events = growth.take_events();
+        view.descent.add(self.model, &events);
+        Ok(changed || !events.is_empty())
+    }
+
+    /// Adds the sheets of a drawing at a time in s that are not known.
+    fn find_new(&self, (scene, now): (&Scene, f64), view: &mut View) -> Result<(), Error> {
+        for place in &scene.sheets {
+            let known = |hung: &Arc<Hung>| hung.key.number == place.key.number;
+            let line: HashSet<u64> = view.descent.line(place.key.module).collect();
+            let mut all = self.hung.iter().map(|(hung, _)| hung).chain(&view.births);
+            if all.any(|hung| known(hung) && line.contains(&hung.key.module)) {
+                continue;
+            }
+            let points = self.points() + view.births.iter().map(|hung| hung.made.len()).sum::<usize>();
+            view.births.push(Arc::new(self.hang(place, now, points)?));
+        }
+        Ok(())
+    }
+
+    /// A new sheet where the turtle stands, at a time in s; `before` is the number of points of those that are there.
+    fn hang(&self, place: &SheetPlace, now: f64, before: usize) -> Result<Hung, Error> {
+        let scenery = &self.model.scenery;
+        let declared = &scenery.sheets[place.sheet];
+        let span = || place.origin.span(self.model).unwrap_or(declared.span);
+        let time = self.place.time_at(now);
+        if before + declared.points.len() > MOST_SHEET_POINTS {
+            return Err(Error::TooManySheets { most: MOST_SHEET_POINTS, time, span: span() });
+        }
+        let metre = self.place.units.length;
+        let at =
+            |point: &[f64; 3]| self.place.point(place.placement.point(Point::from(*point)).coords * metre);
+        let points = declared.points.iter().map(at).collect();
+        let mesh = Mesh { points, faces: declared.faces.clone(), cords: declared.cords.clone() };
+        let made = Sheet::new(&mesh, &material(&scenery.tissues[declared.tissue]), |_| false);
+        let made =
+            made.map_err(|error| Error::Sheet { name: declared.name.clone(), error, time, span: span() })?;
+        let made = Arc::new(made.pinned_at(&declared.pinned));
+        Ok(Hung { key: place.key, origin: place.origin, sheet: place.sheet, made, begin: now })
+    }
+
+    /// Follows all sheets through the tick.
+    fn solve(&mut self, view: &View) -> Result<Vec<Track>, Error> {
+        let ways: Vec<_> = view.paths.iter().map(|path| |time: f64| path.place(time)).collect();
+        let mut solids: Vec<Solid> =
+            view.paths.iter().zip(&ways).map(|(path, way)| Solid::guided(&path.shape, way)).collect();
+        let floor = Shape::half_space();
+        let height = self.place.ground;
+        let ground = move |_: f64| Stand::at(Vector::new(0.0, height.unwrap_or_default(), 0.0));
+        if height.is_some() {
+            solids.push(Solid::guided(&floor, &ground));
+        }
+        let mut tracks = Vec::with_capacity(self.hung.len() + view.births.len());
+        let born = view.births.iter().map(|hung| (hung.clone(), State::at_rest(&hung.made)));
+        let (begin, end) = (self.begin(), self.begin() + TICK);
+        for (hung, mut state) in self.hung.iter().cloned().chain(born) {
+            let from = hung.begin.max(begin);
+            let mut steps = vec![(from, state.clone())];
+            let wind = Gusts(&self.wind);
+            let observe = |step: &Step| steps.push((step.to, step.after.clone()));
+            if from < end {
+                let done = self.solver.advance(&hung.made, &mut state, from..end, &solids, &wind, observe);
+                done.map_err(|error| self.failed(&hung, error))?;
+            }
+            tracks.push(Track { hung, steps });
+        }
+        Ok(tracks)
+    }
+
+    /// A sheet that cannot be followed.
+    fn failed(&self, hung: &Hung, error: sheet::Error) -> Error {
+        let declared = &self.model.scenery.sheets[hung.sheet];
+        let time = self.place.time_at(self.begin());
+        if let sheet::Error::OutOfTime { .. } = error {
+            return Error::OutOfTime { limit: f64::NAN, time, span: declared.span };
+        }
+        let span = hung.origin.span(self.model).unwrap_or(declared.span);
+        self.wind.failure().unwrap_or(Error::Sheet { name: declared.name.clone(), error, time, span })
+    }
+
+    /// The next tick begins.
+    fn end(&mut self, view: View, tracks: Vec<Track>) -> Result<Tick, Error> {
+        let last = |track: &Track| track.steps.last().map(|(_, state)| (track.hung.clone(), state.clone()));
+        let mut hung: Vec<(Arc<Hung>, State)> = tracks.iter().filter_map(last).collect();
+        if let Some(places) = &view.next {
+            let mut here: Vec<(Arc<Hung>, State)> = Vec::with_capacity(places.len());
+            for place in places {
+                let before = view.descent.line(place.key.module).find_map(|module| {
+                    let key = SheetKey { module, ..place.key };
+                    hung.iter().find(|(hung, _)| hung.key == key)
+                });
+                let Some((before, state)) = before else { continue };
+                let Hung { sheet, ref made, begin, .. } = **before;
+                let made = Arc::clone(made);
+                let next = Hung { key: place.key, origin: place.origin, sheet, made, begin };
+                here.push((Arc::new(next), state.clone()));
+            }
+            hung = here;
+        }
+        self.hung = hung;
+        let number = self.number;
+        self.number += 1;
+        Ok(Tick { number, tracks, descent: view.descent, failed: view.failed })
+    }
+}
+
+/// The material of a tissue of constant stiffness.
+pub(crate) fn material(tissue: &Tissue) -> sheet::Tissue {
+    let stiffness = tissue.stiffness.eval_one(&[0.0]);
+    sheet::Tissue {
+        damping: tissue.damping,
+        ..sheet::Tissue::new(stiffness, tissue.density, tissue.thickness)
+    }
+}

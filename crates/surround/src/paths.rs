@@ -1,0 +1,231 @@
+//! Solids of a model on their way through a tick: the shapes that sheets meet, and where they are.
+//!
+//! What a solid module draws counts as the smallest convex body around it. Its place is a polynomial of degree 3 through the drawings at four instants,
+//! so that motion under a force that is linear in time is exact.
+
+use std::collections::HashMap;
+
+use dlsys_geometry::scene::Scene;
+use dlsys_geometry::turtle::{self, Origin, Passive};
+use dlsys_model::Model;
+use dlsys_sheet::{Attitude, Place as Stand, Shape, Vector};
+use dlsys_tree::ModuleString;
+
+use crate::Error;
+use crate::descent::Descent;
+use crate::place::Place;
+use crate::points::{Pair, rigid_motion};
+use crate::solids::{MOST_BODIES, corners, rounded};
+
+/// The instants of a tick at which solids are drawn, in parts of it.
+pub(crate) const INSTANTS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
+/// Most iterations to find a rotation, each of which squares the error.
+const ITERATIONS: usize = 8;
+
+/// A polynomial through values at [`INSTANTS`], over the parts of a tick.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cubic([Vector; 4]);
+
+impl Cubic {
+    fn through(values: [Vector; 4]) -> Cubic {
+        let [a, b, c, d] = values;
+        // What stands is exactly at rest.
+        let [b, c, d] = [b - a, c - a, d - a];
+        let first = (b * 18.0 - c * 9.0 + d * 2.0) / 2.0;
+        let second = (c * 36.0 - b * 45.0 - d * 9.0) / 2.0;
+        let third = (b * 27.0 - c * 27.0 + d * 9.0) / 2.0;
+        Cubic([a, first, second, third])
+    }
+
+    fn value(&self, part: f64) -> Vector {
+        let [a, b, c, d] = self.0;
+        a + (b + (c + d * part) * part) * part
+    }
+
+    fn slope(&self, part: f64) -> Vector {
+        let [_, b, c, d] = self.0;
+        b + (c * 2.0 + d * (3.0 * part)) * part
+    }
+}
+
+/// A solid on its way through a tick.
+#[derive(Clone, Debug)]
+pub(crate) struct Path {
+    pub(crate) shape: Shape,
+    /// Where the tick begins, and its length, in s.
+    begin: f64,
+    length: f64,
+    centre: Cubic,
+    /// The rotation vector since the beginning of the tick.
+    turn: Cubic,
+}
+
+impl Path {
+    /// Where it is at a time in s.
+    pub(crate) fn place(&self, time: f64) -> Stand {
+        let part = (time - self.begin) / self.length;
+        let (turn, rate) = (self.turn.value(part), self.turn.slope(part) / self.length);
+        Stand {
+            position: self.centre.value(part),
+            attitude: Attitude::from_scaled_axis(turn),
+            velocity: self.centre.slope(part) / self.length,
+            spin: rate + turn.cross(&rate) / 2.0,
+        }
+    }
+}
+
+/// A solid as it is drawn at an instant, in m.
+#[derive(Clone)]
+struct Drawn {
+    origin: Origin,
+    balls: Vec<(Vector, f64)>,
+}
+
+/// The solids of a tick so far.
+#[derive(Clone, Default)]
+pub(crate) struct Watch {
+    first: Vec<Drawn>,
+    /// The drawings at the other instants; `None` where there is none of as many points.
+    later: Vec<[Option<Vec<Vector>>; 3]>,
+}
+
+impl Watch {
+    /// Notes the solids of a string at an instant, by its number. `descent` has the productions since the first one.
+    pub(crate) fn note(
+        &mut self,
+        (instant, string): (usize, &ModuleString),
+        (model, place): (&Model, &Place),
+        descent: &Descent,
+        scene: &mut Scene,
+    ) -> Result<(), Error> {
+        let is_solid =
+            |module: dlsys_tree::Module| model.scenery.solids.iter().any(|(kind, _)| *kind == module.kind);
+        if !string.iter().any(is_solid) {
+            return Ok(());
+        }
+        let mut drawn = Vec::new();
+        for solid in turtle::solids(model, string, scene)? {
+            let span = || {
+                let mut declared = model.scenery.solids.iter();
+                declared
+                    .find(|(kind, _)| *kind == solid.origin.kind)
+                    .map(|(_, span)| *span)
+                    .unwrap_or_default()
+            };
+            if let Some(passive) = solid.passive {
+                let kind = model.kinds.get(solid.origin.kind).name.clone();
+                let (falls, meets) = (passive == Passive::Falls, true);
+                let lineage = solid.origin.lineage;
+                return Err(Error::PassiveSolid {
+                    kind,
+                    lineage,
+                    falls,
+                    meets,
+                    time: string.time,
+                    span: span(),
+                });
+            }
+            if drawn.len() == MOST_BODIES {
+                return Err(Error::TooManySolids { most: MOST_BODIES, time: string.time, span: span() });
+            }
+            let metre = place.units.length;
+            let ball = |(point, radius): &(dlsys_geometry::scene::Point, f64)| {
+                (place.point(point.coords * metre), radius * metre)
+            };
+            drawn.push(Drawn { origin: solid.origin, balls: solid.points.iter().map(ball).collect() });
+        }
+        if instant == 0 {
+            self.later = vec![Default::default(); drawn.len()];
+            self.first = drawn;
+            return Ok(());
+        }
+        let known: HashMap<u64, usize> =
+            self.first.iter().enumerate().map(|(i, solid)| (solid.origin.lineage.id, i)).collect();
+        for solid in drawn {
+            let first = descent.line(solid.origin.lineage.id).find_map(|id| known.get(&id));
+            if let Some(&first) = first.filter(|first| self.first[**first].balls.len() == solid.balls.len()) {
+                let points = solid.balls.iter().map(|(point, _)| *point).collect();
+                self.later[first][instant - 1].get_or_insert(points);
+            }
+        }
+        Ok(())
+    }
+
+    /// The ways of all solids through a tick that begins at a time and has a length, in s. What is not drawn at an instant stays where it was before.
+    pub(crate) fn paths(&self, begin: f64, length: f64) -> Vec<Path> {
+        self.first
+            .iter()
+            .zip(&self.later)
+            .filter_map(|(first, later)| path(first, later, (begin, length)))
+            .collect()
+    }
+}
+
+fn path(first: &Drawn, later: &[Option<Vec<Vector>>; 3], (begin, length): (f64, f64)) -> Option<Path> {
+    let chosen = corners(&first.balls);
+    let balls: Vec<(Vector, f64)> = chosen.iter().map(|i| first.balls[*i]).collect();
+    let middle = balls.iter().map(|(point, _)| point).sum::<Vector>() / balls.len().max(1) as f64;
+    let (points, radius) = rounded(&balls);
+    let shape = Shape::rounded(points.iter().map(|point| point - middle).collect(), radius).ok()?;
+    let (mut centres, mut turns) = ([middle; 4], [Vector::zeros(); 4]);
+    for k in 0..3 {
+        (centres[k + 1], turns[k + 1]) = (centres[k], turns[k]);
+        if let Some(there) = &later[k] {
+            let pairs: Vec<Pair> = chosen.iter().map(|i| (first.balls[*i].0, there[*i])).collect();
+            centres[k + 1] = pairs.iter().map(|(_, there)| there).sum::<Vector>() / pairs.len() as f64;
+            turns[k + 1] = rotation(&pairs, [middle, centres[k + 1]], turns[k]);
+        }
+    }
+    let (centre, turn) = (Cubic::through(centres), Cubic::through(turns));
+    Some(Path { shape, begin, length, centre, turn })
+}
+
+/// The rotation vector that leads from places about one centre to places about another, as near as that is possible. `guess` is one for an instant before.
+fn rotation(pairs: &[Pair], [from, to]: [Vector; 2], guess: Vector) -> Vector {
+    let mut turn = Attitude::from_scaled_axis(guess);
+    for _ in 0..ITERATIONS {
+        let apart = |(here, there): &Pair| {
+            let turned = turn * (here - from);
+            (turned, (there - to) - turned)
+        };
+        let moved: Vec<Pair> = pairs.iter().map(apart).collect();
+        let more = rigid_motion(&moved, Vector::zeros()).spin;
+        turn = Attitude::from_scaled_axis(more) * turn;
+        if more.norm() < 1e-12 {
+            break;
+        }
+    }
+    turn.scaled_axis()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dlsys_model::KindId;
+    use dlsys_tree::Lineage;
+
+    /// A cube that turns and flies along a parabola.
+    #[test]
+    fn a_path_is_that_of_the_drawings() {
+        let corner = |k: usize| Vector::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64) * 0.2;
+        let middle = Vector::repeat(0.1);
+        let (v, a, w) =
+            (Vector::new(1.0, 2.0, -0.5), Vector::new(0.0, -9.81, 0.0), Vector::new(3.0, -20.0, 5.0));
+        let at = |t: f64, k: usize| {
+            middle + v * t + a * (t * t / 2.0) + Attitude::from_scaled_axis(w * t) * (corner(k) - middle)
+        };
+        let length = 1.0 / 64.0;
+        let points = |t: f64| (0..8).map(|k| at(t, k)).collect::<Vec<_>>();
+        let origin = Origin::new(KindId::OPEN, Lineage::of_axiom(0));
+        let first = Drawn { origin, balls: points(0.0).into_iter().map(|point| (point, 0.0)).collect() };
+        let later = [1, 2, 3].map(|k| Some(points(length * INSTANTS[k])));
+        let path = path(&first, &later, (2.0, length)).expect("a body");
+        for part in [0.0, 0.4, 1.0] {
+            let (t, place) = (length * part, path.place(2.0 + length * part));
+            assert!((place.position - (middle + v * t + a * (t * t / 2.0))).norm() < 1e-12);
+            assert!((place.velocity - (v + a * t)).norm() < 1e-10);
+            assert!((place.spin - w).norm() < 1e-7, "{}", place.spin);
+            assert!((place.attitude * (corner(5) - middle) + place.position - at(t, 5)).norm() < 1e-12);
+        }
+    }
+}

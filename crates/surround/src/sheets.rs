@@ -1,0 +1,234 @@
+//! The sheets of a model at any time: flexible surfaces and nets, the same bits whatever is asked for, in whatever order.
+//!
+//! ```text
+//! ticks  t₀   t₁   t₂   t₃ ...     a global grid, t_n = n/64 s
+//! kept        [ t₁   t₂   t₃ ]     the last ticks, for times that come a little late
+//! marks  ●         ●               copies to begin again from
+//! ```
+
+use std::collections::{HashMap, VecDeque};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use dlsys_diagnostic::Span;
+use dlsys_geometry::scene::{
+    MaterialId, Mesh, Placement, Point, Scene, Segment, SheetKey, SheetPlace, Surface, Vector, Width,
+};
+use dlsys_geometry::turtle;
+use dlsys_model::Model;
+use dlsys_sheet::{Counts, State};
+use dlsys_sim::Settings;
+
+use crate::Error;
+use crate::coupled;
+use crate::hanging::{Hanging, TICK, Tick};
+use crate::motion::MOST_TICKS;
+use crate::place::Place;
+use crate::weather::{Sampler, Weather};
+
+/// Most points of the ticks that are kept for times that come a little late, and of marks.
+const MOST_KEPT: usize = 2_000_000;
+const MOST_MARKED: usize = 2_000_000;
+/// Largest number of marks, and the first distance between them, in ticks.
+const MOST_MARKS: usize = 24;
+const FIRST_SPACING: u64 = 64;
+
+/// The sheets of a model.
+pub struct Sheets<'m> {
+    model: &'m Model,
+    settings: Settings,
+    place: Place,
+    runs: Mutex<Runs<'m>>,
+}
+
+struct Runs<'m> {
+    start: Hanging<'m>,
+    present: Option<Hanging<'m>>,
+    /// In the order of time, without gaps, up to the present.
+    past: VecDeque<Arc<Tick>>,
+    marks: Vec<Hanging<'m>>,
+    spacing: u64,
+    spent: Duration,
+}
+
+impl<'m> Sheets<'m> {
+    /// The sheets of the model of a scene; `None` if nothing places one.
+    ///
+    /// # Errors
+    /// A wind without meaning, or the first instant fails.
+    pub fn new(model: &'m Model, settings: Settings) -> Result<Option<Sheets<'m>>, Error> {
+        if !turtle::drapes(model) {
+            return Ok(None);
+        }
+        let place = Place::of_scene(&model.scenery);
+        let settings = Settings { log: true, transitions: false, ..settings };
+        let growth = coupled::start(model, settings, place)?;
+        let wind = Arc::new(Sampler::new(Weather::around_bodies(&model.scenery)?, place));
+        let start = Hanging::new(model, (growth, place), wind, settings.bending.tolerance);
+        let (past, marks) = Default::default();
+        let runs = Runs { start, present: None, past, marks, spacing: FIRST_SPACING, spent: Duration::ZERO };
+        Ok(Some(Sheets { model, settings, place, runs: Mutex::new(runs) }))
+    }
+
+    /// Draws the sheets that a scene places, as they are at a time of the model. They follow what is drawn there.
+    ///
+    /// # Errors
+    /// The growth up to that time fails; a sheet cannot be followed; there are too many ticks or points, or the wind has no value.
+    pub fn draw(&self, time: f64, scene: &mut Scene) -> Result<(), Error> {
+        if scene.sheets.is_empty() {
+            return Ok(());
+        }
+        let seconds = self.place.seconds(time).max(0.0);
+        let tick = self.tick(time, seconds)?;
+        let tracks: HashMap<SheetKey, usize> =
+            tick.tracks.iter().enumerate().map(|(i, track)| (track.hung.key, i)).collect();
+        let places = scene.sheets.clone();
+        for place in &places {
+            let known = tick
+                .descent
+                .line(place.key.module)
+                .find_map(|module| tracks.get(&SheetKey { module, ..place.key }));
+            let state = known.and_then(|track| tick.tracks[*track].at(seconds));
+            self.add(place, state, scene);
+        }
+        Ok(())
+    }
+
+    /// Work of the solver in the run that is at present the latest.
+    pub fn counts(&self) -> Counts {
+        let runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
+        runs.present.as_ref().map_or_else(Counts::default, Hanging::counts)
+    }
+
+    /// The tick within which a time lies; a time at the end of a tick belongs to that.
+    fn tick(&self, time: f64, seconds: f64) -> Result<Arc<Tick>, Error> {
+        let number = ((seconds / TICK).ceil() - 1.0).max(0.0);
+        if number > MOST_TICKS {
+            let second = self.place.units.time;
+            return Err(Error::TooLong { most: MOST_TICKS, time, seconds: second, span: self.span() });
+        }
+        let number = number as u64;
+        let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
+        let runs = &mut *runs;
+        if let Some(first) = runs.past.front().map(|tick| tick.number).filter(|first| *first <= number)
+            && let Some(tick) = runs.past.get((number - first) as usize)
+        {
+            return Ok(Arc::clone(tick));
+        }
+        let begun = Instant::now();
+        let limit = self.settings.max_seconds;
+        let left = Duration::try_from_secs_f64(limit).unwrap_or(Duration::MAX).saturating_sub(runs.spent);
+        let deadline = limit.is_finite().then(|| begun.checked_add(left)).flatten();
+        let done = self.go_to(runs, number, deadline);
+        runs.spent += begun.elapsed();
+        match done {
+            Err(Error::OutOfTime { time, span, .. }) => Err(Error::OutOfTime { limit, time, span }),
+            done => done,
+        }
+    }
+
+    fn go_to(&self, runs: &mut Runs<'m>, number: u64, deadline: Option<Instant>) -> Result<Arc<Tick>, Error> {
+        let mut present = match runs.present.take() {
+            Some(present) if present.number <= number => present,
+            _ => {
+                runs.past.clear();
+                let mark = runs.marks.iter().rev().find(|mark| mark.number <= number);
+                mark.unwrap_or(&runs.start).clone()
+            }
+        };
+        present.give_up_at(deadline);
+        loop {
+            let tick = Arc::new(present.tick()?);
+            keep(&tick, &present, runs);
+            if let Some(error) = tick.failed.as_ref().filter(|_| tick.number < number) {
+                return Err(error.clone());
+            }
+            if tick.number == number {
+                // Nothing comes after a failure.
+                runs.present = tick.failed.is_none().then_some(present);
+                return Ok(tick);
+            }
+            if deadline.is_some_and(|deadline| Instant::now() > deadline) {
+                let time = self.place.time_at(present.begin());
+                return Err(Error::OutOfTime { limit: f64::NAN, time, span: self.span() });
+            }
+        }
+    }
+
+    /// The declaration of the first sheet.
+    fn span(&self) -> Span {
+        self.model.scenery.sheets.first().map(|sheet| sheet.span).unwrap_or_default()
+    }
+
+    /// Draws a sheet: faces as one surface, cords as stems. Without a state it has the shape of its file.
+    fn add(&self, place: &SheetPlace, state: Option<State>, scene: &mut Scene) {
+        let declared = &self.model.scenery.sheets[place.sheet];
+        let metre = self.place.units.length;
+        let points: Vec<Point> = match state {
+            Some(state) => state.positions.iter().map(|point| Point::from(point / metre)).collect(),
+            None => declared.points.iter().map(|point| place.placement.point(Point::from(*point))).collect(),
+        };
+        let fan = |face: &Vec<usize>| {
+            (2..face.len()).map(|k| [face[0], face[k - 1], face[k]].map(|i| i as u32)).collect::<Vec<_>>()
+        };
+        let triangles = declared.faces.iter().flat_map(fan).map(|corners| (corners, MaterialId::PETAL));
+        let axes = [Vector::x(), Vector::y(), Vector::z()];
+        if !declared.faces.is_empty() {
+            let mesh = Mesh::of_triangles(points.clone(), &[], triangles);
+            let placement = Placement::uniform(Point::origin(), axes, 1.0);
+            let (tint, owner) = (place.tint, place.owner);
+            scene.surfaces.push(Surface { mesh: Arc::new(mesh), patches: None, placement, tint, owner });
+        }
+        let tissue = &self.model.scenery.tissues[declared.tissue];
+        let width = Width::Set(tissue.thickness / metre);
+        let first = scene.segments.len();
+        for [from, to] in &declared.cords {
+            let (start, end) = (points[*from], points[*to]);
+            let Some(direction) = (end - start).try_normalize(0.0) else { continue };
+            let last = scene.segments[first..].last().filter(|last| last.end == start);
+            // Along a cord the cross-section does not turn.
+            let beside = last.map_or(axes[direction.iamin()], |last| last.across);
+            let across = beside - direction * beside.dot(&direction);
+            let across = across.try_normalize(1e-9).unwrap_or_else(|| {
+                let other = axes[direction.iamin()];
+                (other - direction * other.dot(&direction)).normalize()
+            });
+            let follows = last.map(|_| scene.segments.len() - 1);
+            scene.segments.push(Segment {
+                start,
+                end,
+                direction,
+                across,
+                widths: [width; 2],
+                contour: None,
+                material: place.tint.unwrap_or(MaterialId::STEM),
+                owner: place.owner,
+                follows,
+                grows_from: None,
+            });
+        }
+    }
+}
+
+/// Keeps a tick for times that come late, and sets a mark where one is due.
+fn keep<'m>(tick: &Arc<Tick>, present: &Hanging<'m>, runs: &mut Runs<'m>) {
+    runs.past.push_back(Arc::clone(tick));
+    let mut kept: usize = runs.past.iter().map(|tick| tick.size()).sum();
+    while kept > MOST_KEPT && runs.past.len() > 1 {
+        kept -= runs.past.pop_front().map_or(0, |past| past.size());
+    }
+    let number = present.number;
+    let is_new = runs.marks.last().is_none_or(|mark| mark.number < number);
+    if tick.failed.is_none() && number.is_multiple_of(runs.spacing) && is_new {
+        runs.marks.push(present.clone());
+    }
+    let marked = |marks: &[Hanging]| marks.iter().map(Hanging::points).sum::<usize>();
+    while runs.marks.len() > MOST_MARKS || marked(&runs.marks) > MOST_MARKED {
+        runs.spacing *= 2;
+        let spacing = runs.spacing;
+        runs.marks.retain(|mark| mark.number.is_multiple_of(spacing));
+        if runs.spacing > 1 << 40 {
+            break;
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! Sheets (`sheet`): what they are made of, the work of following them, and how they are coupled to the model.
+
+use super::scene::ScenePart;
+use crate::model::{Model, Sheet};
+use crate::sim::brief;
+use crate::surround::SHEET_TICK;
+use crate::turtle;
+
+/// The rows of the table of the scene, one for each sheet.
+pub fn parts(model: &Model) -> Vec<ScenePart> {
+    let drapes = turtle::drapes(model);
+    let part = |sheet: &std::sync::Arc<Sheet>| {
+        let name = format!("sheet {}", sheet.name);
+        if !drapes || model.kinds.find(&sheet.name, 0).is_none() {
+            return ScenePart::new(name, "nothing to do", "no string and no drawing places it");
+        }
+        ScenePart::new(name, "in steps", why(model, sheet))
+    };
+    model.scenery.sheets.iter().map(part).collect()
+}
+
+fn why(model: &Model, sheet: &Sheet) -> String {
+    let scenery = &model.scenery;
+    let tissue = &scenery.tissues[sheet.tissue];
+    let held = sheet.pinned.iter().filter(|held| **held).count();
+    let seconds = model.frames.map_or(0.0, |frames| frames.to) * scenery.units.time;
+    let mut meets = Vec::new();
+    if scenery.wind.is_some() || !scenery.flows.is_empty() {
+        meets.push("the wind");
+    }
+    if !scenery.solids.is_empty() {
+        meets.push("solids");
+    }
+    if scenery.ground.is_some() {
+        meets.push("the ground");
+    }
+    let meets = if meets.is_empty() { String::new() } else { format!(" and {}", meets.join(", ")) };
+    format!(
+        "{} points, {} faces and {} cords of {}, held at {held}; implicit steps of controlled error under weight{meets}, \
+        in {} ticks of 1/64 s; one way: no rule reads what it does",
+        sheet.points.len(),
+        sheet.faces.len(),
+        sheet.cords.len(),
+        tissue.name,
+        brief((seconds / SHEET_TICK).ceil(), 6),
+    )
+}
