@@ -79,7 +79,7 @@ fn a_sheet_begins_in_the_shape_of_its_file_and_hangs_through() {
     for (found, rest) in new.iter().zip(&rest) {
         assert!((found - rest).norm() < 1e-12, "{found} instead of {rest}");
     }
-    let held = |k: usize| k % 5 == 0 || k % 5 == 4;
+    let held = |k: usize| k.is_multiple_of(5) || k % 5 == 4;
     assert!((0..25).filter(|k| held(*k)).all(|k| later[k] == new[k]));
     assert!((0..25).filter(|k| !held(*k)).any(|k| later[k] != new[k]));
 }
