@@ -311,7 +311,7 @@ pub fn help(name: &str) -> Result<String, String> {
     }
     let Some(command) = find(name) else {
         if let Some(Declaration { word, usage, summary, .. }) = Declaration::of_word(name) {
-            return Ok(format!("{word} {usage}\n  {summary}\n"));
+            return Ok(format!("{word} {usage}\n{}", wrapped(summary, 2, 88)));
         }
         let known = names().chain(declarations::words());
         let hint = did_you_mean(name, known).map(|hint| format!("; {hint}")).unwrap_or_default();
@@ -347,7 +347,7 @@ fn overview() -> String {
     for category in Category::ALL {
         let words = DECLARATIONS.iter().filter(|d| d.category == category).map(|d| d.word);
         let line = words.collect::<Vec<_>>().join(", ");
-        text += &format!("  {:8} {line}\n", category.title());
+        text += &format!("  {:8} {}", category.title(), wrapped(&line, 11, 80).trim_start());
     }
     text += "\n`help COMMAND` gives usage and examples. Tab completes, the right arrow takes a hint,\nCtrl-R searches the history. `:COMMAND` is always a command, never a rule.\n";
     text
