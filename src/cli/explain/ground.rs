@@ -22,8 +22,10 @@ pub fn part(model: &Model) -> Option<ScenePart> {
     if !shelves.is_empty() {
         reasons.push(format!("{} carry what falls", shelves.join(", ")));
     }
-    if !scenery.pours.is_empty() {
-        reasons.push(format!("`pour` adds to it in {} place(s)", scenery.pours.len()));
+    match scenery.pours.len() {
+        0 => (),
+        1 => reasons.push("`pour` adds to it".to_owned()),
+        count => reasons.push(format!("`pour` adds to it in {count} places")),
     }
     if reasons.is_empty() {
         let why = format!(
