@@ -243,3 +243,11 @@ fn the_net_of_the_book_opens_for_the_ball() {
     let within = widest(&draw(&nursery, &session, 0.44));
     assert!(before < 0.115 && within > 0.12, "{before} and {within}");
 }
+
+#[test]
+fn a_tissue_of_a_sheet_alone_bends_no_stems() {
+    let session =
+        Session::open(Path::new(&repository("models/scenes/basketball.dls")), &[]).expect("a model");
+    assert!(!session.model.scenery.tissues.is_empty() && !dlsys::turtle::bends(&session.model));
+    assert!(!dlsys::session::sways(&session.model));
+}

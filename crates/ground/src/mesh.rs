@@ -161,10 +161,12 @@ impl Weaver<'_> {
         if rim.len() == 4 {
             let [a, b, c, d] = corners.map(|corner| self.point(corner));
             // The shorter diagonal, so that ridges and valleys are not cut.
-            let height = |corner: (i32, i32)| self.ground.top(corner.0, corner.1);
-            let first = (height(corners[0]) - height(corners[2])).abs();
-            let second = (height(corners[1]) - height(corners[3])).abs();
-            let halves = if first <= second { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
+            let drop = |from: u32, to: u32| {
+                let height = |n: u32| self.mesh.points[n as usize].y;
+                (height(from) - height(to)).abs()
+            };
+            let halves =
+                if drop(a, c) <= drop(b, d) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
             self.mesh.triangles.extend(halves);
             return;
         }

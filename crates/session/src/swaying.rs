@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use dlsys_geometry::scene::Seedling;
-use dlsys_geometry::turtle::lets_go;
+use dlsys_geometry::turtle::{bends, lets_go};
 use dlsys_model::{Model, Units};
 use dlsys_sim::Settings;
 use dlsys_surround::{ByModes, CLOCK, Classes, Error, Motion, Passive, Place, Weather};
@@ -51,9 +51,7 @@ impl<'m> Around<'m> {
 
 /// True if something in a model, or in the plants in it, is passive: stems that give way, or what is let go.
 pub fn sways(model: &Model) -> bool {
-    !model.scenery.tissues.is_empty()
-        || lets_go(model)
-        || model.scenery.plants.iter().any(|plant| sways(&plant.model))
+    bends(model) || lets_go(model) || model.scenery.plants.iter().any(|plant| sways(&plant.model))
 }
 
 /// A plant at its place: its number, its seed, its birth and its placement.

@@ -60,7 +60,7 @@ struct Track {
     effort: Effort,
 }
 
-/// Runs a model with each method at each tolerance. `None` if the model has no tissues. Runs that take longer than `limit` seconds are
+/// Runs a model with each method at each tolerance. `None` if no stems of the model bend. Runs that take longer than `limit` seconds are
 /// left out.
 ///
 /// # Errors
@@ -72,7 +72,7 @@ pub fn stem_study(
     limit: f64,
     say: &mut dyn FnMut(&str),
 ) -> Result<Option<StemStudy>, String> {
-    if session.model.scenery.tissues.is_empty() || times.is_empty() {
+    if !turtle::bends(&session.model) || times.is_empty() {
         return Ok(None);
     }
     // The run before took so long.

@@ -113,7 +113,7 @@ impl<'m> Motion<'m> {
         place: Place,
         passive: Passive,
     ) -> Result<Option<Motion<'m>>, Error> {
-        if model.scenery.tissues.is_empty() && !turtle::lets_go(model) {
+        if !turtle::bends(model) && !turtle::lets_go(model) {
             return Ok(None);
         }
         check(model, &place, place.first_tick() as f64)?;

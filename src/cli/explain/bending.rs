@@ -12,6 +12,7 @@ use crate::sim::{Settings, Simulation, brief};
 use crate::surround::{self, Axis, CLOCK, MOST_TICKS, Survey, Vibration};
 use crate::sway::Air;
 use crate::tree::ModuleString;
+use crate::turtle;
 
 /// Most groups of axes in the text.
 const MOST_SHOWN: usize = 8;
@@ -95,7 +96,7 @@ impl BendingPlan {
 
     /// Of a model, or of a plant of this model in the wind of a scene.
     fn within(scene: &Model, model: &Model, plant: Option<String>) -> Option<BendingPlan> {
-        if model.scenery.tissues.is_empty() {
+        if !turtle::bends(model) {
             return None;
         }
         let units = model.scenery.units;

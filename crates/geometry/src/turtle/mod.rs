@@ -208,6 +208,12 @@ pub fn kinds_that_let_go(model: &Model) -> Vec<bool> {
     Command::that_hold(|command| command == Command::Detach, model)
 }
 
+/// True if stems of a model may give way (`@E`).
+pub fn bends(model: &Model) -> bool {
+    !model.scenery.tissues.is_empty()
+        && Command::that_hold(|command| command == Command::Elastic, model).contains(&true)
+}
+
 /// True if a model may let go of something (`@D`).
 pub fn lets_go(model: &Model) -> bool {
     kinds_that_let_go(model).contains(&true)
