@@ -7,7 +7,6 @@
 //! Ticks of gases are powers of 2 of a second, so that their multiples are exact. Growth is one tick ahead of the clouds. Between ticks, centres are
 //! cubics with the places and velocities at both.
 
-use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -24,6 +23,7 @@ use crate::Error;
 use crate::coupled;
 use crate::descent::Descent;
 use crate::drift::Drift;
+use crate::marks::{Marks, Recent};
 use crate::motion::{MOST_TICKS, Motion};
 use crate::outlets::{Change, Outlet};
 use crate::place::Place;
@@ -38,9 +38,6 @@ const MOST_SPLIT: usize = 20_000;
 /// Most blobs of the ticks that are kept for times that come a little late, and of marks.
 const MOST_KEPT: usize = 500_000;
 const MOST_MARKED: usize = 1_000_000;
-/// Largest number of marks, and the first distance between them, in ticks.
-const MOST_MARKS: usize = 24;
-const FIRST_SPACING: u64 = 64;
 /// A blob as large as this part of the smallest eddies is replaced by smaller ones.
 const EDDY: f64 = 0.5;
 
@@ -84,9 +81,8 @@ struct State<'m> {
     start: Course<'m>,
     has_begun: bool,
     present: Option<Course<'m>>,
-    past: VecDeque<Moment>,
-    marks: Vec<Course<'m>>,
-    spacing: u64,
+    past: Recent<Moment>,
+    marks: Marks<Course<'m>>,
     spent: Duration,
     scene: Scene,
 }
@@ -152,9 +148,8 @@ impl<'m> Gases<'m> {
             start: Course { growth, moment },
             has_begun: false,
             present: None,
-            past: VecDeque::new(),
-            marks: Vec::new(),
-            spacing: FIRST_SPACING,
+            past: Recent::new(MOST_KEPT),
+            marks: Marks::new(MOST_MARKED),
             spent: Duration::ZERO,
             scene: turtle::blank(model),
         };
@@ -194,10 +189,7 @@ impl<'m> Gases<'m> {
         motion: Option<&Motion<'m>>,
         in_time: &dyn Fn(f64) -> Result<(), Error>,
     ) -> Result<Moment, Error> {
-        let first = state.past.front().map(|moment| moment.number);
-        if let Some(first) = first.filter(|first| *first <= number)
-            && let Some(moment) = state.past.get((number - first) as usize)
-        {
+        if let Some(moment) = state.past.get(number) {
             return Ok(moment.clone());
         }
         if !state.has_begun {
@@ -207,15 +199,16 @@ impl<'m> Gases<'m> {
             Some(present) if present.moment.number <= number => present,
             _ => {
                 state.past.clear();
-                let mark = state.marks.iter().rev().find(|mark| mark.moment.number <= number);
-                mark.unwrap_or(&state.start).clone()
+                state.marks.before(number).unwrap_or(&state.start).clone()
             }
         };
         while present.moment.number < number {
             in_time(self.time_of(present.moment.number))?;
             let before = present.moment.clone();
             self.tick(&mut present, state, motion)?;
-            keep(before, &present, state);
+            let size = 1 + before.blobs();
+            state.past.add(before.number, before, size);
+            state.marks.set(present.moment.number, &present, |course| course.moment.blobs());
         }
         let moment = present.moment.clone();
         state.present = Some(present);
@@ -380,26 +373,5 @@ impl<'m> Gases<'m> {
         let span = strongest.and_then(|outlet| outlet.origin.span(self.model));
         let span = span.unwrap_or(declared.span);
         Error::Gas { name: declared.name.to_string(), error, time: self.place.time_at(begin), span }
-    }
-}
-
-/// Keeps what is past for times that come late, and sets a mark where one is due.
-fn keep<'m>(before: Moment, present: &Course<'m>, state: &mut State<'m>) {
-    state.past.push_back(before);
-    let mut kept: usize = state.past.iter().map(|moment| moment.blobs() + 1).sum();
-    while kept > MOST_KEPT {
-        let Some(first) = state.past.pop_front() else { break };
-        kept -= first.blobs() + 1;
-    }
-    let number = present.moment.number;
-    let is_new = state.marks.last().is_none_or(|mark| mark.moment.number < number);
-    if number.is_multiple_of(state.spacing) && is_new {
-        state.marks.push(present.clone());
-    }
-    let marked = |marks: &[Course]| marks.iter().map(|mark| mark.moment.blobs()).sum::<usize>();
-    while state.marks.len() > MOST_MARKS || marked(&state.marks) > MOST_MARKED {
-        state.spacing *= 2;
-        let spacing = state.spacing;
-        state.marks.retain(|mark| mark.moment.number.is_multiple_of(spacing));
     }
 }

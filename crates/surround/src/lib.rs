@@ -32,6 +32,7 @@ mod flights;
 mod gases;
 mod hanging;
 mod loose;
+mod marks;
 mod motion;
 mod outlets;
 mod paths;

@@ -4,11 +4,8 @@
 //! ticks   t₀   t₁   t₂   t₃   t₄   t₅ ...       a global grid, t_n = n · 1/30 s
 //! growth  ───────────────────────▶              one tick ahead of the stems
 //! stems   ──────────────────▶ present
-//! kept              [ t₂   t₃   t₄ ]            the last ticks, for frames that come a little late
-//! marks   ●              ●                      copies to begin again from
 //! ```
 
-use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -25,6 +22,7 @@ use crate::classes::ByModes;
 use crate::coupled;
 use crate::course::{Course, Past};
 use crate::flights::Flights;
+use crate::marks::{Marks, Recent};
 use crate::place::Place;
 use crate::weather::{Sampler, Weather};
 use crate::{CLOCK, Error};
@@ -33,10 +31,6 @@ use crate::{CLOCK, Error};
 pub const MOST_TICKS: f64 = 1e7;
 /// Most stems of the ticks that are kept.
 const MOST_KEPT: usize = 1_000_000;
-/// Largest number of marks.
-const MOST_MARKS: usize = 24;
-/// The first distance between marks, in ticks.
-const FIRST_SPACING: u64 = 64;
 
 /// How passive motion is computed and kept.
 #[derive(Clone, Debug)]
@@ -85,16 +79,14 @@ pub struct Motion<'m> {
 }
 
 struct Courses<'m> {
+    /// At the first tick.
+    start: Course<'m>,
     present: Course<'m>,
     /// What has been let go up to the latest tick, if anything may be. A release is the same whichever course comes by.
     flights: Option<Flights<'m>>,
-    /// In the order of time, without gaps, up to the present tick.
-    past: VecDeque<Past>,
-    /// The sum of the sizes of the past ticks.
-    kept: usize,
-    marks: Vec<Course<'m>>,
-    spacing: u64,
-    passive: Passive,
+    past: Recent<Past>,
+    /// `None` if none are kept.
+    marks: Option<Marks<Course<'m>>>,
     /// Seconds that the stems may take, and what they have taken.
     limit: f64,
     spent: Duration,
@@ -125,16 +117,13 @@ impl<'m> Motion<'m> {
         let mut flights = Flights::new(model, sampler, place, passive.solver.tolerance);
         let present = Course::new(model, (growth, bending), &mut flights)?;
         let courses = Courses {
-            // Without marks the whole is begun anew where time goes back.
-            marks: vec![present.clone()],
-            passive,
+            start: present.clone(),
+            past: Recent::new(passive.kept),
+            marks: passive.marks.then(|| Marks::new(usize::MAX)),
             limit: settings.max_seconds,
             spent: Duration::ZERO,
             present,
             flights,
-            past: VecDeque::new(),
-            kept: 0,
-            spacing: FIRST_SPACING,
             scene: turtle::blank(model),
         };
         Ok(Some(Motion { model, courses: Mutex::new(courses) }))
@@ -222,25 +211,21 @@ impl<'m> Courses<'m> {
             return Ok(BentStems::at_rest());
         }
         let number = number as u64;
-        if number < self.present.number && self.past.front().is_none_or(|past| past.number > number) {
-            let mark = self.marks.iter().rev().find(|mark| mark.number <= number);
-            let mark = mark.or(self.marks.first()).cloned();
-            if let Some(mark) = mark {
-                (self.present, self.past, self.kept) = (mark, VecDeque::new(), 0);
+        if number < self.present.number {
+            if let Some(Past { tick, descent, .. }) = self.past.get(number) {
+                return bent(tick, descent, &self.present.bending, string, &mut self.scene);
             }
+            let mark = self.marks.as_ref().and_then(|marks| marks.before(number));
+            self.present = mark.unwrap_or(&self.start).clone();
+            self.past.clear();
         }
-        if number >= self.present.number {
-            while self.present.number < number {
-                self.tick()?;
-            }
-            let Course { tick, descent, held, .. } = &self.present;
-            if let Some((_, error)) = held.as_ref().filter(|(since, _)| *since <= string.time) {
-                return Err(error.clone());
-            }
-            return bent(tick, descent, &self.present.bending, string, &mut self.scene);
+        while self.present.number < number {
+            self.tick()?;
         }
-        let first = self.past.front().map_or(0, |past| past.number);
-        let Past { tick, descent, .. } = &self.past[(number - first) as usize];
+        let Course { tick, descent, held, .. } = &self.present;
+        if let Some((_, error)) = held.as_ref().filter(|(since, _)| *since <= string.time) {
+            return Err(error.clone());
+        }
         bent(tick, descent, &self.present.bending, string, &mut self.scene)
     }
 
@@ -262,12 +247,11 @@ impl<'m> Courses<'m> {
         self.spent += begun.map_or(Duration::ZERO, |begun| begun.elapsed());
         self.check_time()?;
         let past = past?;
-        self.kept += past.size();
-        self.past.push_back(past);
-        while self.kept > self.passive.kept && self.past.len() > 1 {
-            self.kept -= self.past.pop_front().map_or(0, |past| past.size());
+        let size = past.size();
+        self.past.add(past.number, past, size);
+        if let Some(marks) = &mut self.marks {
+            marks.set(self.present.number, &self.present, |_| 0);
         }
-        self.mark();
         Ok(())
     }
 
@@ -279,22 +263,5 @@ impl<'m> Courses<'m> {
         let bending = &self.present.bending;
         let (time, span) = (bending.place().time_of(self.present.number), span(bending.model()));
         Err(Error::OutOfTime { limit: self.limit, time, span })
-    }
-
-    /// Sets a mark where one is due.
-    fn mark(&mut self) {
-        let number = self.present.number;
-        if !self.passive.marks
-            || !number.is_multiple_of(self.spacing)
-            || self.marks.last().is_some_and(|mark| mark.number >= number)
-        {
-            return;
-        }
-        self.marks.push(self.present.clone());
-        if self.marks.len() > MOST_MARKS {
-            self.spacing *= 2;
-            let (spacing, first) = (self.spacing, self.marks[0].number);
-            self.marks.retain(|mark| mark.number.is_multiple_of(spacing) || mark.number == first);
-        }
     }
 }

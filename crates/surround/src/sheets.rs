@@ -1,12 +1,6 @@
 //! The sheets of a model at any time: flexible surfaces and nets, the same bits whatever is asked for, in whatever order.
-//!
-//! ```text
-//! ticks  t₀   t₁   t₂   t₃ ...     a global grid, t_n = n/64 s
-//! kept        [ t₁   t₂   t₃ ]     the last ticks, for times that come a little late
-//! marks  ●         ●               copies to begin again from
-//! ```
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -22,6 +16,7 @@ use dlsys_sim::Settings;
 use crate::Error;
 use crate::coupled;
 use crate::hanging::{Hanging, TICK, Tick};
+use crate::marks::{Marks, Recent};
 use crate::motion::MOST_TICKS;
 use crate::place::Place;
 use crate::weather::{Sampler, Weather};
@@ -29,9 +24,6 @@ use crate::weather::{Sampler, Weather};
 /// Most points of the ticks that are kept for times that come a little late, and of marks.
 const MOST_KEPT: usize = 2_000_000;
 const MOST_MARKED: usize = 2_000_000;
-/// Largest number of marks, and the first distance between them, in ticks.
-const MOST_MARKS: usize = 24;
-const FIRST_SPACING: u64 = 64;
 
 /// The sheets of a model.
 pub struct Sheets<'m> {
@@ -44,10 +36,8 @@ pub struct Sheets<'m> {
 struct Runs<'m> {
     start: Hanging<'m>,
     present: Option<Hanging<'m>>,
-    /// In the order of time, without gaps, up to the present.
-    past: VecDeque<Arc<Tick>>,
-    marks: Vec<Hanging<'m>>,
-    spacing: u64,
+    past: Recent<Arc<Tick>>,
+    marks: Marks<Hanging<'m>>,
     spent: Duration,
 }
 
@@ -65,8 +55,8 @@ impl<'m> Sheets<'m> {
         let growth = coupled::start(model, settings, place)?;
         let wind = Arc::new(Sampler::new(Weather::around_bodies(&model.scenery)?, place));
         let start = Hanging::new(model, (growth, place), wind, settings.bending.tolerance);
-        let (past, marks) = Default::default();
-        let runs = Runs { start, present: None, past, marks, spacing: FIRST_SPACING, spent: Duration::ZERO };
+        let (past, marks) = (Recent::new(MOST_KEPT), Marks::new(MOST_MARKED));
+        let runs = Runs { start, present: None, past, marks, spent: Duration::ZERO };
         Ok(Some(Sheets { model, settings, place, runs: Mutex::new(runs) }))
     }
 
@@ -110,9 +100,7 @@ impl<'m> Sheets<'m> {
         let number = number as u64;
         let mut runs = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
         let runs = &mut *runs;
-        if let Some(first) = runs.past.front().map(|tick| tick.number).filter(|first| *first <= number)
-            && let Some(tick) = runs.past.get((number - first) as usize)
-        {
+        if let Some(tick) = runs.past.get(number) {
             return Ok(Arc::clone(tick));
         }
         let begun = Instant::now();
@@ -132,14 +120,16 @@ impl<'m> Sheets<'m> {
             Some(present) if present.number <= number => present,
             _ => {
                 runs.past.clear();
-                let mark = runs.marks.iter().rev().find(|mark| mark.number <= number);
-                mark.unwrap_or(&runs.start).clone()
+                runs.marks.before(number).unwrap_or(&runs.start).clone()
             }
         };
         present.give_up_at(deadline);
         loop {
             let tick = Arc::new(present.tick()?);
-            keep(&tick, &present, runs);
+            runs.past.add(tick.number, Arc::clone(&tick), tick.size());
+            if tick.failed.is_none() {
+                runs.marks.set(present.number, &present, Hanging::points);
+            }
             if let Some(error) = tick.failed.as_ref().filter(|_| tick.number < number) {
                 return Err(error.clone());
             }
@@ -206,29 +196,6 @@ impl<'m> Sheets<'m> {
                 follows,
                 grows_from: None,
             });
-        }
-    }
-}
-
-/// Keeps a tick for times that come late, and sets a mark where one is due.
-fn keep<'m>(tick: &Arc<Tick>, present: &Hanging<'m>, runs: &mut Runs<'m>) {
-    runs.past.push_back(Arc::clone(tick));
-    let mut kept: usize = runs.past.iter().map(|tick| tick.size()).sum();
-    while kept > MOST_KEPT && runs.past.len() > 1 {
-        kept -= runs.past.pop_front().map_or(0, |past| past.size());
-    }
-    let number = present.number;
-    let is_new = runs.marks.last().is_none_or(|mark| mark.number < number);
-    if tick.failed.is_none() && number.is_multiple_of(runs.spacing) && is_new {
-        runs.marks.push(present.clone());
-    }
-    let marked = |marks: &[Hanging]| marks.iter().map(Hanging::points).sum::<usize>();
-    while runs.marks.len() > MOST_MARKS || marked(&runs.marks) > MOST_MARKED {
-        runs.spacing *= 2;
-        let spacing = runs.spacing;
-        runs.marks.retain(|mark| mark.number.is_multiple_of(spacing));
-        if runs.spacing > 1 << 40 {
-            break;
         }
     }
 }

@@ -6,7 +6,6 @@
 //!
 //! What is seen at a time is the ground at the tick at or before it. Where nothing can touch it any more, ticks pass at no cost.
 
-use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -21,6 +20,7 @@ use dlsys_tree::ModuleString;
 use crate::Error;
 use crate::coupled;
 use crate::descent::Descent;
+use crate::marks::{Marks, Recent};
 use crate::motion::{MOST_TICKS, Motion};
 use crate::place::Place;
 use crate::pressing::{Placed, placed};
@@ -35,9 +35,6 @@ const DEEP: f64 = 10_000.0;
 const MEMORY: usize = 1024;
 /// Most columns of the moments that are kept because they were asked for, and of marks.
 const MOST_KEPT: usize = 4_000_000;
-/// Largest number of marks, and the first distance between them, in ticks.
-const MOST_MARKS: usize = 24;
-const FIRST_SPACING: u64 = 64;
 /// Patches of bodies are as near to theirs as this part of a column.
 const ACCURACY: f64 = 0.1;
 
@@ -71,10 +68,9 @@ struct State<'m> {
     /// The bodies of the start are known.
     has_begun: bool,
     present: Option<Course<'m>>,
-    /// Moments that were asked for, with the columns that each does not share with the one before.
-    kept: BTreeMap<u64, (Moment, usize)>,
-    marks: Vec<Course<'m>>,
-    spacing: u64,
+    /// Moments that were asked for: they may be asked for again.
+    kept: Recent<Moment>,
+    marks: Marks<Course<'m>>,
     spent: Duration,
     scene: Scene,
     /// The last mesh, and its tick.
@@ -128,9 +124,8 @@ impl<'m> Terrain<'m> {
             start: Course { growth, moment },
             has_begun: false,
             present: None,
-            kept: BTreeMap::new(),
-            marks: Vec::new(),
-            spacing: FIRST_SPACING,
+            kept: Recent::new(MOST_KEPT),
+            marks: Marks::new(MOST_KEPT),
             spent: Duration::ZERO,
             scene: turtle::blank(model),
             mesh: None,
@@ -215,7 +210,7 @@ impl<'m> Terrain<'m> {
         motion: Option<&Motion<'m>>,
         in_time: &dyn Fn(f64) -> Result<(), Error>,
     ) -> Result<Moment, Error> {
-        if let Some((moment, _)) = state.kept.get(&number) {
+        if let Some(moment) = state.kept.get(number) {
             return Ok(moment.clone());
         }
         if !state.has_begun {
@@ -231,10 +226,7 @@ impl<'m> Terrain<'m> {
         }
         let mut present = match state.present.take() {
             Some(present) if present.moment.number <= number => present,
-            _ => {
-                let mark = state.marks.iter().rev().find(|mark| mark.moment.number <= number);
-                mark.unwrap_or(&state.start).clone()
-            }
+            _ => state.marks.before(number).unwrap_or(&state.start).clone(),
         };
         while present.moment.number < number {
             in_time(self.time_of(present.moment.number))?;
@@ -243,11 +235,16 @@ impl<'m> Terrain<'m> {
                 break;
             }
             self.tick(&mut present, state, motion)?;
-            mark(&present, state);
+            state.marks.set(present.moment.number, &present, |course| course.moment.ground.stored());
         }
         let moment = present.moment.clone();
         state.present = Some(present);
-        keep(&moment, state);
+        // Columns that it does not share with the one before.
+        let own = match state.kept.before(number) {
+            Some(before) => moment.ground.changed_since(&before.ground).len() * 32 * 32,
+            None => moment.ground.stored(),
+        };
+        state.kept.add(number, moment.clone(), own + 1);
         Ok(moment)
     }
 
@@ -410,37 +407,5 @@ fn material(soil: &Soil) -> ground::Soil {
         cohesion: soil.cohesion.unwrap_or(base.cohesion),
         weight: soil.weight.unwrap_or(base.weight),
         swell: soil.swell.unwrap_or(base.swell),
-    }
-}
-
-/// Keeps a moment that was asked for: it may be asked for again.
-fn keep(moment: &Moment, state: &mut State) {
-    let before = state.kept.range(..moment.number).next_back();
-    let own = match before {
-        Some((_, (before, _))) => moment.ground.changed_since(&before.ground).len() * 32 * 32,
-        None => moment.ground.stored(),
-    };
-    state.kept.insert(moment.number, (moment.clone(), own + 1));
-    let mut size: usize = state.kept.values().map(|(_, size)| size).sum();
-    while size > MOST_KEPT && state.kept.len() > 1 {
-        size -= state.kept.pop_first().map_or(0, |(_, (_, size))| size);
-    }
-}
-
-/// Sets a mark where one is due.
-fn mark<'m>(present: &Course<'m>, state: &mut State<'m>) {
-    let number = present.moment.number;
-    let is_new = state.marks.last().is_none_or(|mark| mark.moment.number < number);
-    if number.is_multiple_of(state.spacing) && is_new {
-        state.marks.push(present.clone());
-    }
-    let stored = |marks: &[Course]| marks.iter().map(|mark| mark.moment.ground.stored()).sum::<usize>();
-    while state.marks.len() > MOST_MARKS || (stored(&state.marks) > MOST_KEPT && state.marks.len() > 1) {
-        state.spacing *= 2;
-        let spacing = state.spacing;
-        state.marks.retain(|mark| mark.moment.number.is_multiple_of(spacing));
-        if state.marks.len() <= 1 {
-            break;
-        }
     }
 }
