@@ -20,6 +20,7 @@
 
 #![warn(missing_docs)]
 
+mod advice;
 mod bending;
 mod body;
 mod classes;
