@@ -37,6 +37,8 @@ enum PieceShape {
     Surface(Arc<Mesh>, Vec<u32>, [f64; 3]),
     /// Pieces from column to column and from row to row.
     Patch(usize, usize),
+    /// These corners of a mesh whose vertices move.
+    Net(Arc<Mesh>, Vec<u32>),
 }
 
 /// What is needed to cut forms into triangles.
@@ -73,7 +75,7 @@ impl Cutter<'_> {
                     let shape = PieceShape::Polygon(points.len());
                     layout.add(&mut counts, material, &triangles, points.len(), first, shape);
                 }
-                Part::Surface(place) => {
+                Part::Surface(place) | Part::Net(place, _) => {
                     self.surface(&mut layout, &mut counts, (place, paint, form), first, &own)
                 }
                 Part::Patch => {
@@ -117,10 +119,11 @@ impl Cutter<'_> {
         let limits = source.limits();
         let scale =
             |numbers: &[N]| (0..3).map(|k| triple(numbers, k + 1).norm() / limits[k]).fold(0.0_f64, f64::max);
-        let largest = own.iter().map(|numbers| scale(numbers)).fold(0.0, f64::max);
+        let index = part_at(form, first);
+        let moves = matches!(form.get(index), Some(Part::Net(..)));
+        let largest = own.iter().filter(|_| !moves).map(|numbers| scale(numbers)).fold(0.0, f64::max);
         let mesh = source.mesh(self.accuracy, largest);
         // The part's own colour, if it has one.
-        let index = part_at(form, first);
         let tint = paint.get(index).copied().flatten();
         let mut faces: Vec<(MaterialId, Vec<[u32; 3]>)> = Vec::new();
         for face in &mesh.faces {
@@ -142,7 +145,10 @@ impl Cutter<'_> {
                 *corner = *own;
             }
             let count = corners.len();
-            let shape = PieceShape::Surface(mesh.clone(), corners, limits);
+            let shape = match moves {
+                true => PieceShape::Net(mesh.clone(), corners),
+                false => PieceShape::Surface(mesh.clone(), corners, limits),
+            };
             layout.add(counts, material, &triangles, count, first, shape);
         }
     }
@@ -186,7 +192,7 @@ impl Layout {
     pub(crate) fn pinned(&self) -> Vec<Vec<[f32; 2]>> {
         let mut all = vec![Vec::new(); self.primitives.len()];
         for piece in &self.pieces {
-            if let PieceShape::Surface(mesh, corners, _) = &piece.shape {
+            if let PieceShape::Surface(mesh, corners, _) | PieceShape::Net(mesh, corners) = &piece.shape {
                 let places = corners.iter().filter_map(|&corner| mesh.places.get(corner as usize));
                 all[piece.primitive].extend(places.map(|place| place.map(|x| x as f32)));
             }
@@ -234,6 +240,11 @@ impl Layout {
                     }
                 }
                 PieceShape::Patch(columns, rows) => patch(&net(own), *columns, *rows, &mut put),
+                PieceShape::Net(mesh, corners) => {
+                    let at = |corner: u32| triple(own, corner as usize);
+                    let normals = mesh.normals_at(|corner| at(corner).into());
+                    corners.iter().for_each(|&corner| put(at(corner), normals[corner as usize]));
+                }
             }
         }
     }

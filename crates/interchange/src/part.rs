@@ -6,6 +6,7 @@
 //! | a polygon | its corners |
 //! | a surface | origin, and the displacements along its three axes from there to the limits of its mesh |
 //! | a patch | 16 control points, row by row |
+//! | a net: a surface whose vertices move by themselves | its vertices |
 //!
 //! All numbers are points or displacements, three at a time, and the corners of meshes depend on them linearly (those of stems nearly). So a straight line
 //! between the numbers of two instants is a straight line between all corners, and a bound of the difference of numbers is
@@ -28,6 +29,8 @@ pub(crate) enum Part {
     Surface(usize),
     /// A bicubic Bézier patch.
     Patch,
+    /// A surface whose vertices move, by the place in memory of its mesh at rest, and their number.
+    Net(usize, u32),
 }
 
 impl Part {
@@ -38,6 +41,7 @@ impl Part {
             Part::Polygon(corners) => 3 * corners as usize,
             Part::Surface(_) => 12,
             Part::Patch => 48,
+            Part::Net(_, corners) => 3 * corners as usize,
         }
     }
 
@@ -57,7 +61,9 @@ impl Part {
         match self {
             Part::Stem(_) => norm(0).max(norm(1)) + norm(2),
             Part::Surface(_) => (0..4).map(norm).sum(),
-            Part::Polygon(_) | Part::Patch => (0..numbers.len() / 3).map(norm).fold(0.0, f64::max),
+            Part::Polygon(_) | Part::Patch | Part::Net(..) => {
+                (0..numbers.len() / 3).map(norm).fold(0.0, f64::max)
+            }
         }
     }
 }
@@ -203,9 +209,10 @@ pub(crate) enum Source {
 
 impl Source {
     pub(crate) fn of(surface: &Surface) -> Source {
-        match &surface.patches {
-            Some(patches) => Source::Patches(patches.clone(), surface.mesh.clone()),
-            None => Source::Mesh(surface.mesh.clone()),
+        match (&surface.patches, &surface.rest) {
+            (Some(patches), _) => Source::Patches(patches.clone(), surface.mesh.clone()),
+            (None, Some(rest)) => Source::Mesh(rest.clone()),
+            (None, None) => Source::Mesh(surface.mesh.clone()),
         }
     }
 

@@ -158,16 +158,23 @@ impl Sampler {
                 let surface = &scene.surfaces[i];
                 let source = Source::of(surface);
                 let place = source.place();
-                put(point(surface.placement.origin));
-                for ((axis, scale), limit) in
-                    surface.placement.axes.iter().zip(surface.placement.scales).zip(source.limits())
-                {
-                    put(frame.local(*axis) * (scale * limit * metres));
-                }
+                let part = if surface.rest.is_some() {
+                    let vertices = &surface.mesh.vertices;
+                    vertices.iter().for_each(|p| put(point(surface.placement.point(*p))));
+                    Part::Net(place, vertices.len() as u32)
+                } else {
+                    put(point(surface.placement.origin));
+                    for ((axis, scale), limit) in
+                        surface.placement.axes.iter().zip(surface.placement.scales).zip(source.limits())
+                    {
+                        put(frame.local(*axis) * (scale * limit * metres));
+                    }
+                    Part::Surface(place)
+                };
                 if sample.sources.iter().all(|known| known.0 != place) {
                     sample.sources.push((place, source));
                 }
-                (Part::Surface(place), surface.tint)
+                (part, surface.tint)
             }
             Element::Patch(i) => {
                 let patch = &scene.patches[i];

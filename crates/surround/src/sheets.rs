@@ -9,7 +9,7 @@ use dlsys_geometry::scene::{
     MaterialId, Mesh, Placement, Point, Scene, Segment, SheetKey, SheetPlace, Surface, Vector, Width,
 };
 use dlsys_geometry::turtle;
-use dlsys_model::Model;
+use dlsys_model::{self as model, Model};
 use dlsys_sheet::{Counts, State};
 use dlsys_sim::Settings;
 
@@ -30,6 +30,8 @@ pub struct Sheets<'m> {
     model: &'m Model,
     settings: Settings,
     place: Place,
+    /// The faces of each that is declared, in the shape of its file; `None` for one of cords alone.
+    rests: Vec<Option<Arc<Mesh>>>,
     runs: Mutex<Runs<'m>>,
 }
 
@@ -57,7 +59,8 @@ impl<'m> Sheets<'m> {
         let start = Hanging::new(model, (growth, place), wind, settings.bending.tolerance);
         let (past, marks) = (Recent::new(MOST_KEPT), Marks::new(MOST_MARKED));
         let runs = Runs { start, present: None, past, marks, spent: Duration::ZERO };
-        Ok(Some(Sheets { model, settings, place, runs: Mutex::new(runs) }))
+        let rests = model.scenery.sheets.iter().map(|sheet| at_rest(sheet)).collect();
+        Ok(Some(Sheets { model, settings, place, rests, runs: Mutex::new(runs) }))
     }
 
     /// Draws the sheets that a scene places, as they are at a time of the model. They follow what is drawn there.
@@ -158,16 +161,12 @@ impl<'m> Sheets<'m> {
             Some(state) => state.positions.iter().map(|point| Point::from(point / metre)).collect(),
             None => declared.points.iter().map(|point| place.placement.point(Point::from(*point))).collect(),
         };
-        let fan = |face: &Vec<usize>| {
-            (2..face.len()).map(|k| [face[0], face[k - 1], face[k]].map(|i| i as u32)).collect::<Vec<_>>()
-        };
-        let triangles = declared.faces.iter().flat_map(fan).map(|corners| (corners, MaterialId::PETAL));
         let axes = [Vector::x(), Vector::y(), Vector::z()];
-        if !declared.faces.is_empty() {
-            let mesh = Mesh::of_triangles(points.clone(), &[], triangles);
+        if let Some(rest) = &self.rests[place.sheet] {
+            let mesh = Arc::new(rest.moved(points.clone()));
             let placement = Placement::uniform(Point::origin(), axes, 1.0);
-            let (tint, owner) = (place.tint, place.owner);
-            scene.surfaces.push(Surface { mesh: Arc::new(mesh), patches: None, placement, tint, owner });
+            let (tint, owner, rest) = (place.tint, place.owner, Some(Arc::clone(rest)));
+            scene.surfaces.push(Surface { mesh, patches: None, rest, placement, tint, owner });
         }
         let tissue = &self.model.scenery.tissues[declared.tissue];
         let width = Width::Set(tissue.thickness / metre);
@@ -198,4 +197,14 @@ impl<'m> Sheets<'m> {
             });
         }
     }
+}
+
+/// The faces of a sheet as triangles.
+fn at_rest(sheet: &model::Sheet) -> Option<Arc<Mesh>> {
+    let fan = |face: &Vec<usize>| {
+        (2..face.len()).map(|k| [face[0], face[k - 1], face[k]].map(|i| i as u32)).collect::<Vec<_>>()
+    };
+    let triangles = sheet.faces.iter().flat_map(fan).map(|corners| (corners, MaterialId::PETAL));
+    let points = sheet.points.iter().map(|point| Point::from(*point)).collect();
+    (!sheet.faces.is_empty()).then(|| Arc::new(Mesh::of_triangles(points, &[], triangles)))
 }

@@ -80,6 +80,8 @@ pub struct Surface {
     /// What `mesh` is a preview of, if the surface is curved: the mesh of the right accuracy is made when a
     /// frame is written (see [`Scene::tessellated`](super::Scene::tessellated)).
     pub patches: Option<Arc<PatchSet>>,
+    /// A mesh with the same faces that stays the same, if the vertices of `mesh` move by themselves, as those of a sheet do.
+    pub rest: Option<Arc<Mesh>>,
     /// Where it is placed.
     pub placement: Placement,
     /// Stands in for the materials of those faces that take a colour.

@@ -206,6 +206,24 @@ impl Mesh {
         mesh
     }
 
+    /// The same faces with their vertices in other places, and normals that follow the faces.
+    pub fn moved(&self, vertices: Vec<Point>) -> Mesh {
+        let normals = self.normals_at(|corner| vertices[corner as usize]);
+        let places = self.places.clone();
+        Mesh { vertices, normals, places, faces: self.faces.clone(), ..Mesh::new() }.finish()
+    }
+
+    /// For each vertex the sum of the vector areas of its faces, times 2, where its vertices are elsewhere.
+    pub fn normals_at(&self, vertex: impl Fn(u32) -> Point) -> Vec<Vector> {
+        let mut normals = vec![Vector::zeros(); self.vertices.len()];
+        for face in &self.faces {
+            let [p, q, r] = face.corners.map(&vertex);
+            let area = (q - p).cross(&(r - p));
+            face.corners.iter().for_each(|&corner| normals[corner as usize] += area);
+        }
+        normals
+    }
+
     /// Brings the normals to unit length, after the last grid.
     pub fn finish(mut self) -> Mesh {
         for normal in &mut self.normals {

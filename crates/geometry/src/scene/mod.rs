@@ -343,7 +343,7 @@ impl Scene {
         let owner = self.add_owner(Owner { name: "=ground".into(), lineage: Lineage::of_axiom(0) });
         let axes = [Vector::x(), Vector::y(), Vector::z()];
         let placement = Placement::uniform(Point::origin(), axes, 1.0);
-        self.surfaces.push(Surface { mesh, patches: None, placement, tint: None, owner });
+        self.surfaces.push(Surface { mesh, patches: None, rest: None, placement, tint: None, owner });
         self.terrain = Some(owner);
     }
 

@@ -83,7 +83,7 @@ impl Patch {
         let paint = Paint { material: self.material, takes_tint: false, has_picture: false };
         tessellate(&unit, accuracy / scale, steps, paint, &mut mesh);
         let placement = Placement::uniform(origin, [Vector::x(), Vector::y(), Vector::z()], scale);
-        Surface { mesh: Arc::new(mesh), patches: None, placement, tint: None, owner: self.owner }
+        Surface { mesh: Arc::new(mesh), patches: None, rest: None, placement, tint: None, owner: self.owner }
     }
 }
 

@@ -93,7 +93,7 @@ impl Walk<'_> {
                 Placement { origin: self.seen(self.state.position), axes: self.seen_axes(), scales };
             let (tint, owner) = (self.chosen(), self.owner());
             let Shape { mesh, patches } = shape.clone();
-            self.scene.surfaces.push(Surface { mesh, patches, placement, tint, owner });
+            self.scene.surfaces.push(Surface { mesh, patches, rest: None, placement, tint, owner });
             let carrier = self.carrier();
             if let Some(recorder) = &mut self.recorder {
                 recorder.surfaces.push(carrier);
