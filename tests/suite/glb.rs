@@ -64,7 +64,7 @@ fn side(segment: &Segment, default_width: f64) -> Vec<Point> {
 }
 
 /// The largest distance of drawn points from what the file shows for their module, in metres.
-fn worst(followed: &Followed, times: &[f64], first: f64) -> f64 {
+pub fn worst(followed: &Followed, times: &[f64], first: f64) -> f64 {
     let glb = Glb::read(&followed.growth.file(Format::Glb).expect("a file"));
     worst_of(followed, |seconds| glb.shown(seconds), times, first)
 }

@@ -8,6 +8,7 @@ use dlsys::sim::Settings;
 use dlsys::tree::ModuleString;
 
 use crate::common::repository;
+use crate::glb::{self, follow, random_times};
 
 /// A cloth of 4 by 4 squares, 1 by 1 in the plane y = 0.
 fn cloth() -> String {
@@ -250,4 +251,16 @@ fn a_tissue_of_a_sheet_alone_bends_no_stems() {
         Session::open(Path::new(&repository("models/scenes/basketball.dls")), &[]).expect("a model");
     assert!(!session.model.scenery.tissues.is_empty() && !dlsys::turtle::bends(&session.model));
     assert!(!dlsys::session::sways(&session.model));
+}
+
+/// In a file that plays, a sheet is one mesh, whose points are where they are drawn at any time.
+#[test]
+fn files_that_play_have_one_mesh_for_a_sheet() {
+    let session = session(&format!("{CLOTH}{BALL}"));
+    let followed = follow(session, [0.0, 1.5, 0.05], 2);
+    // The ball, and the cloth.
+    assert_eq!(followed.growth.nodes(), 2);
+    let worst = glb::worst(&followed, &random_times(0.0, 1.5, 60), 0.0);
+    let allowed = followed.options.accuracy * followed.options.extent * followed.options.metres;
+    assert!(worst > 0.0 && worst <= allowed, "{worst} of {allowed}");
 }
