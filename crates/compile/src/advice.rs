@@ -4,7 +4,7 @@
 //! here, so that the passes stay readable.
 
 use crate::scope::{RESERVED, Variables};
-use dlsys_diagnostic::Diagnostic;
+use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{Class, ELASTIC, Kinds, SOURCE};
 use dlsys_syntax::ast::{Expr, ExprId, Expressions, HeadModule, Module, Name};
 use dlsys_syntax::print;
@@ -13,6 +13,19 @@ use dlsys_syntax::suggest::{did_you_mean, meant, nearest};
 /// Help for a name that is declared twice.
 pub fn twice(name: &str) -> String {
     format!("keep one of them, or call the second `{}`", numbered(name))
+}
+
+/// Something that may be given once, at two places.
+pub fn given_twice(what: &str, [first, second]: [Span; 2]) -> Diagnostic {
+    Diagnostic::error(format!("{what} is given twice"))
+        .at(second, "the second time")
+        .at(first, "the first time")
+        .help("keep one of them, and remove the other")
+}
+
+/// A declaration beyond the largest number of them.
+pub fn too_many(most: usize, what: &str, span: Span, help: &str) -> Diagnostic {
+    Diagnostic::error(format!("more than {most} {what}")).at(span, "this one is too many").help(help)
 }
 
 /// The next numbered name: `k_2` for `k`, `s_3` for `s_2`.

@@ -1,5 +1,6 @@
 //! Gases: from the syntax tree to the model.
 
+use crate::advice;
 use crate::appearance::color;
 use crate::physics::{MAX_DECLARED, Quantity, not_negative, positive, shown};
 use crate::scenery::Builder;
@@ -65,19 +66,15 @@ impl Builder<'_> {
             }
         }
         if let [first, second, ..] = colors {
-            self.scope.diagnostics.push(
-                Diagnostic::error("`color` is given twice")
-                    .at(second.span, "the second time")
-                    .at(first.span, "the first time")
-                    .help("keep one of them, and remove the other"),
-            );
+            self.scope.diagnostics.push(advice::given_twice("`color`", [first.span, second.span]));
         }
         if self.scenery.gases.len() == MAX_DECLARED {
-            self.scope.diagnostics.push(
-                Diagnostic::error(format!("more than {MAX_DECLARED} gases"))
-                    .at(span, "this one is too many")
-                    .help("one gas may have any number of sources"),
-            );
+            self.scope.diagnostics.push(advice::too_many(
+                MAX_DECLARED,
+                "gases",
+                span,
+                "one gas may have any number of sources",
+            ));
         }
         // A gas with an error takes its number all the same; the model is refused then.
         let gas = Gas {

@@ -1,5 +1,6 @@
 //! Units, wind, flows and tissues: from the syntax tree to the model.
 
+use crate::advice;
 use crate::scenery::Builder;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::Program;
@@ -123,12 +124,8 @@ impl Builder<'_> {
             let mut all = attributes.iter().filter(|attribute| *attribute.word.text == *word);
             let first = all.next()?;
             if let Some(second) = all.next() {
-                self.scope.diagnostics.push(
-                    Diagnostic::error(format!("`{word}` is given twice"))
-                        .at(second.span, "the second time")
-                        .at(first.span, "the first time")
-                        .help("keep one of them, and remove the other"),
-                );
+                let places = [first.span, second.span];
+                self.scope.diagnostics.push(advice::given_twice(&format!("`{word}`"), places));
             }
             Some(first)
         })
@@ -341,11 +338,12 @@ impl Builder<'_> {
             self.is_direction(turns, &axis.values, "a vortex around the vertical has `axis 0, 1, 0`");
         }
         if self.scenery.flows.len() == MAX_DECLARED {
-            self.scope.diagnostics.push(
-                Diagnostic::error(format!("more than {MAX_DECLARED} flows"))
-                    .at(span, "this one is too many")
-                    .help("turbulence is a part of `wind`: `wind 1, 0, 0 speed 3 turbulence 0.2 scale 5`"),
-            );
+            self.scope.diagnostics.push(advice::too_many(
+                MAX_DECLARED,
+                "flows",
+                span,
+                "turbulence is a part of `wind`: `wind 1, 0, 0 speed 3 turbulence 0.2 scale 5`",
+            ));
         }
         self.scenery.flows.push(Flow { primitive, program, decay: distance, span });
     }
@@ -424,11 +422,12 @@ impl Builder<'_> {
             }
         }
         if self.scenery.tissues.len() == MAX_DECLARED {
-            self.scope.diagnostics.push(
-                Diagnostic::error(format!("more than {MAX_DECLARED} tissues"))
-                    .at(span, "this one is too many")
-                    .help("stems of one tissue may have any width and length"),
-            );
+            self.scope.diagnostics.push(advice::too_many(
+                MAX_DECLARED,
+                "tissues",
+                span,
+                "stems of one tissue may have any width and length",
+            ));
         }
         // A tissue with an error takes its number all the same; the model is refused then.
         let modulus = stiffness.and_then(|stiffness| self.varying(stiffness, &STIFFNESS));

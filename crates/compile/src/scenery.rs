@@ -122,10 +122,7 @@ pub(crate) struct Builder<'b> {
 impl Builder<'_> {
     fn once(&mut self, what: &'static str, span: Span) {
         if let Some((_, before)) = self.seen.iter().find(|(known, _)| *known == what) {
-            let twice = Diagnostic::error(format!("`{what}` is given twice"))
-                .at(span, "the second time")
-                .at(*before, "the first time")
-                .help("keep one of them, and remove the other");
+            let twice = advice::given_twice(&format!("`{what}`"), [*before, span]);
             self.scope.diagnostics.push(twice);
         }
         self.seen.push((what, span));

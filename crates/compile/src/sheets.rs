@@ -26,11 +26,12 @@ impl Builder<'_> {
             return;
         }
         if self.scenery.sheets.len() == MAX_DECLARED {
-            self.scope.diagnostics.push(
-                Diagnostic::error(format!("more than {MAX_DECLARED} sheets"))
-                    .at(span, "this one is too many")
-                    .help("one sheet may be placed any number of times"),
-            );
+            self.scope.diagnostics.push(advice::too_many(
+                MAX_DECLARED,
+                "sheets",
+                span,
+                "one sheet may be placed any number of times",
+            ));
         }
         let found = self.read_sheet((name, file, tissue, pinned), span);
         // The name counts as declared in spite of an error.

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::advice;
 use crate::appearance::color;
 use crate::physics::{MAX_DECLARED, Quantity, not_negative, positive, shown};
 use crate::scenery::Builder;
@@ -97,11 +98,12 @@ impl Builder<'_> {
             self.scope.diagnostics.push(twice);
         }
         if self.scenery.soils.len() == MAX_DECLARED {
-            self.scope.diagnostics.push(
-                Diagnostic::error(format!("more than {MAX_DECLARED} soils"))
-                    .at(span, "this one is too many")
-                    .help("remove those that are not used"),
-            );
+            self.scope.diagnostics.push(advice::too_many(
+                MAX_DECLARED,
+                "soils",
+                span,
+                "remove those that are not used",
+            ));
         }
         let bases: Vec<(&Attribute, SoilBase)> = (attributes.iter())
             .filter_map(|part| {
@@ -119,12 +121,7 @@ impl Builder<'_> {
         }
         let [repose, inner, push, rough, flow, cohesion, weight, swell] = self.sorted(attributes, WORDS);
         if let [first, second, ..] = colors {
-            self.scope.diagnostics.push(
-                Diagnostic::error("`color` is given twice")
-                    .at(second.span, "the second time")
-                    .at(first.span, "the first time")
-                    .help("keep one of them, and remove the other"),
-            );
+            self.scope.diagnostics.push(advice::given_twice("`color`", [first.span, second.span]));
         }
         let base = bases.first().map_or(SoilBase::default(), |(_, base)| *base);
         let angles = [repose, inner].map(|part| part.map(|part| part.span));
@@ -303,11 +300,8 @@ impl Builder<'_> {
         let spot = place.and_then(|place| self.of_time(&place.values)).zip(wide);
         let (Some(soil), Some(rate)) = (number, amount) else { return };
         if self.scenery.pours.len() == MAX_DECLARED {
-            self.scope.diagnostics.push(
-                Diagnostic::error(format!("more than {MAX_DECLARED} times `pour`"))
-                    .at(span, "this one is too many")
-                    .help("a rate and a place may depend on t"),
-            );
+            let help = "a rate and a place may depend on t";
+            self.scope.diagnostics.push(advice::too_many(MAX_DECLARED, "times `pour`", span, help));
         }
         self.scenery.pours.push(Pour { soil, rate, place: spot, span });
     }
