@@ -149,6 +149,11 @@ impl Smoke {
         std::array::from_fn(|k| albedo[k] * light[k] + (1.0 - albedo[k]) * glow[k])
     }
 
+    /// All blobs, each with the area that it hides, in m², as its mass.
+    pub fn blobs(&self) -> impl Iterator<Item = &Blob> {
+        self.puffs.iter().map(|puff| &puff.blob)
+    }
+
     /// The blobs that a ray passes within a span.
     fn passed(&self, ray: &Ray, span: Span, mut found: impl FnMut(Passed)) {
         self.tree.along(ray, span, |range| {

@@ -7,7 +7,6 @@ use dlsys_gas::{self as gas, Light, Look, Ray, Smoke, Span};
 use dlsys_geometry::scene::{Gas, Point, Scene, Vector};
 
 use super::Camera;
-use super::lens::Lens;
 use super::light::LAMP;
 
 /// Distance in standard deviations at which a blob ends: a three-thousandth of its optical depth is beyond.
@@ -90,14 +89,67 @@ impl Haze {
         (aside - ray.direction * along).norm_squared() > self.radius * self.radius || along < -self.radius
     }
 
-    /// A colour, times its opacity, and its opacity, behind the gas: at a point of the picture, as the camera projects it, on a surface or far away.
-    pub(super) fn over(&self, seen: Point, is_surface: bool, behind: [u8; 4]) -> [u8; 4] {
-        let Some(ray) = self.ray(seen).filter(|ray| !self.misses(ray)) else { return behind };
+    /// What the gas does in front of a point of the picture, as the camera projects it, on a surface or far away.
+    pub(super) fn through(&self, seen: Point, is_surface: bool) -> Through {
+        let Some(ray) = self.ray(seen).filter(|ray| !self.misses(ray)) else { return Through::CLEAR };
         let to = match is_surface {
             true => (self.camera.unproject(seen).coords - ray.origin).dot(&ray.direction),
             false => f64::INFINITY,
         };
         let (light, passing) = self.smoke.light(&ray, Span { from: 0.0, to });
+        Through { light, passing }
+    }
+
+    /// The middle of each blob, its standard deviation, and the radius at which it ends.
+    pub(super) fn balls(&self) -> impl Iterator<Item = (Point, f64, f64)> {
+        self.smoke.blobs().map(|blob| {
+            let deviation = blob.variance.sqrt();
+            (Point::from(blob.centre), deviation, REACH * deviation)
+        })
+    }
+
+    /// The part of the sun's light that comes through the gas to a place.
+    pub(super) fn sunlight(&self, at: Vector, towards: Vector) -> f64 {
+        let ray = Ray { origin: at, direction: towards };
+        if self.misses(&ray) { 1.0 } else { self.smoke.transmittance(&ray, Span::ALL) }
+    }
+}
+
+/// What gas does to what is seen through it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Through {
+    /// Light that comes from the gas, by channel.
+    light: [f64; 3],
+    /// The part of the light that passes from behind it.
+    passing: f64,
+}
+
+impl Through {
+    /// Of no gas.
+    const CLEAR: Through = Through { light: [0.0; 3], passing: 1.0 };
+    /// The beginning of a sum.
+    pub(super) const NOTHING: Through = Through { light: [0.0; 3], passing: 0.0 };
+
+    /// Adds another one, times a weight.
+    pub(super) fn add(&mut self, other: &Through, weight: f64) {
+        self.light.iter_mut().zip(other.light).for_each(|(sum, light)| *sum += weight * light);
+        self.passing += weight * other.passing;
+    }
+
+    /// The same where a sum has left the bounds.
+    pub(super) fn within_bounds(self) -> Through {
+        Through { light: self.light.map(|light| light.max(0.0)), passing: self.passing.clamp(0.0, 1.0) }
+    }
+
+    /// The largest difference of a channel or of what passes.
+    pub(super) fn distance(&self, other: &Through) -> f64 {
+        let lights = self.light.iter().zip(other.light).map(|(a, b)| (a - b).abs());
+        lights.fold((self.passing - other.passing).abs(), f64::max)
+    }
+
+    /// A colour, times its opacity, and its opacity, behind the gas.
+    pub(super) fn over(&self, behind: [u8; 4]) -> [u8; 4] {
+        let Through { light, passing } = self;
         let channel = |behind: u8, light: f64| 255.0 * light + passing * f64::from(behind);
         let [red, green, blue, opacity] = behind;
         let colors = [channel(red, light[0]), channel(green, light[1]), channel(blue, light[2])];
@@ -106,12 +158,6 @@ impl Haze {
         let opacity = channel(opacity, 1.0 - passing).max(least);
         let [red, green, blue] = colors;
         [red, green, blue, opacity].map(|value| (value.clamp(0.0, 255.0) + 0.5) as u8)
-    }
-
-    /// The part of the sun's light that comes through the gas to a place.
-    pub(super) fn sunlight(&self, at: Vector, towards: Vector) -> f64 {
-        let ray = Ray { origin: at, direction: towards };
-        if self.misses(&ray) { 1.0 } else { self.smoke.transmittance(&ray, Span::ALL) }
     }
 }
 
@@ -127,12 +173,5 @@ fn blob(gas: &Gas) -> impl Fn(&dlsys_geometry::scene::Blob) -> gas::Blob {
         centre: blob.centre.coords,
         variance: blob.deviation * blob.deviation,
         mass: area * blob.mass,
-    }
-}
-
-impl Lens {
-    /// The middle of a pixel in the plane of focus, as the camera projects it.
-    pub(super) fn middle(&self, pixel: [usize; 2]) -> Point {
-        self.seen(pixel, 0.0)
     }
 }

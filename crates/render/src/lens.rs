@@ -51,8 +51,33 @@ impl Lens {
 
     /// The point that the camera sees in the middle of a pixel at a depth of the rasteriser, as the camera projects it.
     pub(super) fn seen(&self, [column, row]: [usize; 2], depth: f64) -> Point {
+        let at = self.at([column as f64 + 0.5, row as f64 + 0.5]);
+        Point::new(at.x, at.y, depth / self.depth)
+    }
+
+    /// What the camera sees at a place in pixels, in the plane of focus, as the camera projects it.
+    pub(super) fn at(&self, [x, y]: [f64; 2]) -> Point {
         let [a, b, c] = self.placement;
-        Point::new((column as f64 + 0.5 - b) / a, (c - row as f64 - 0.5) / a, depth / self.depth)
+        Point::new((x - b) / a, (c - y) / a, 0.0)
+    }
+
+    /// The first and the last column, and row, of the picture that a ball may touch.
+    pub(super) fn pixels(&self, centre: Point, radius: f64) -> [[usize; 2]; 2] {
+        let last = self.size.map(|side| side.saturating_sub(1));
+        match self.reach(centre, radius) {
+            None => last.map(|last| [0, last]),
+            Some((middle, reach)) => [0, 1].map(|k| {
+                // Saturates below 0.
+                [middle[k] - reach, middle[k] + reach].map(|at| (at as usize).min(last[k]))
+            }),
+        }
+    }
+
+    /// The least and the greatest depth of a ball, as the camera projects it; the greatest is infinite if the viewer is in it.
+    pub(super) fn depths(&self, centre: Point, radius: f64) -> [f64; 2] {
+        let along = self.camera.view().towards() * radius;
+        let depth = |at: Point| self.camera.ahead(at).map_or(f64::INFINITY, |seen| seen.z);
+        [depth(centre - along), depth(centre + along)]
     }
 
     /// How much larger things are at a depth of the rasteriser than in the plane of focus.

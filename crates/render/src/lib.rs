@@ -86,6 +86,7 @@ mod trace;
 mod triangles;
 mod triangulate;
 mod tube;
+mod veil;
 mod view;
 
 pub use camera::Camera;

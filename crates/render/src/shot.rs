@@ -11,6 +11,7 @@ use super::lighting::Lighting;
 use super::mapping::{Cut, Mapping, Pinned};
 use super::raster::{self, Image, Pattern, Place};
 use super::stage::{Part, Stage};
+use super::veil::Veil;
 use dlsys_geometry::scene::{Color, Point, Texture, Vector};
 
 /// Most triangles that are in memory at a time: a picture with more is drawn in strips, if these have fewer.
@@ -38,6 +39,7 @@ struct Face {
 struct Shot<'a> {
     lens: &'a Lens,
     lighting: &'a Lighting<'a>,
+    veil: Option<&'a Veil<'a>>,
     colors: &'a [Color],
     /// By number of a colour: the picture in place of it.
     textures: &'a [Option<&'a Texture>],
@@ -60,9 +62,11 @@ pub(super) fn draw<const N: usize>(
 ) -> Image {
     let [width, height] = lens.size;
     let mut pixels = vec![[0; 4]; width * height];
+    let veil = lighting.haze().map(|haze| Veil::new(haze, lens));
     let mut shot = Shot {
         lens,
         lighting,
+        veil: veil.as_ref(),
         colors: &stage.colors,
         textures: &stage.textures,
         rows: 0..0,
@@ -112,7 +116,7 @@ impl Shot<'_> {
     fn add_block(&mut self, block: &[&Part], stage: &Stage, threads: usize) {
         let made: Vec<OnceLock<Shot>> = block.iter().map(|_| OnceLock::new()).collect();
         let next = AtomicUsize::new(0);
-        let Shot { lens, lighting, colors, textures, ref rows, .. } = *self;
+        let Shot { lens, lighting, veil, colors, textures, ref rows, .. } = *self;
         let make = || {
             loop {
                 let number = next.fetch_add(1, Ordering::Relaxed);
@@ -121,6 +125,7 @@ impl Shot<'_> {
                     let mut shot = Shot {
                         lens,
                         lighting,
+                        veil,
                         colors,
                         textures,
                         rows: rows.clone(),
@@ -311,12 +316,11 @@ impl raster::Triangles for Shot<'_> {
     }
 
     fn is_veiled(&self) -> bool {
-        self.lighting.haze().is_some()
+        self.veil.is_some()
     }
 
     fn open(&self, pixel: [usize; 2]) -> [u8; 4] {
-        let haze = self.lighting.haze();
-        haze.map_or([0; 4], |haze| haze.over(self.lens.middle(pixel), false, [0; 4]))
+        self.veil.map_or([0; 4], |veil| veil.over(pixel, None, [0; 4]))
     }
 
     fn shade(&self, n: usize, pixel: [usize; 2], weights: [f64; 3]) -> [u8; 4] {
@@ -324,7 +328,7 @@ impl raster::Triangles for Shot<'_> {
         let depth = (0..3).map(|k| f64::from([p, q, r][k].depth) * weights[k]).sum();
         let seen = self.lens.seen(pixel, depth);
         let shade = self.surface_shade(n, seen, weights);
-        self.lighting.haze().map_or(shade, |haze| haze.over(seen, true, shade))
+        self.veil.map_or(shade, |veil| veil.over(pixel, Some(seen.z), shade))
     }
 }
 
