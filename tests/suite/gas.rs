@@ -292,3 +292,16 @@ fn too_many_blobs_are_an_error_with_a_place() {
     let message = failure(&long, 10.0);
     assert!(message.contains("more than 1e7 steps") && message.contains("units time"), "{message}");
 }
+
+/// What the ground of a scene does not do is said when the model is read.
+#[test]
+fn gas_over_soil_and_shelves_without_soil_are_reported() {
+    let said = |text: &str| session(text).warnings.iter().map(|w| w.message.clone()).collect::<Vec<_>>();
+    let source = "initial string: @S(smoke, 10, 0.1)\n";
+    let soil = "soil p = sand\nground p cell 0.1\n";
+    assert_eq!(said(&format!("{GAS}{soil}{source}")), ["gas goes through ground of soil"]);
+    assert!(said(&format!("{GAS}ground 0\n{source}")).is_empty());
+    let leaf = "shelf A\ninitial string: A\ninterpret A: @L(1)\n";
+    assert_eq!(said(&format!("ground 0\n{leaf}")), ["`shelf` does nothing here"]);
+    assert!(said(&format!("{soil}{leaf}")).is_empty());
+}

@@ -256,6 +256,7 @@ impl<'d> Parts<'d> {
         scene_checks::tissues(&model, &all, &places.materials, diagnostics);
         scene_checks::gases(&model, &all, &places.materials, diagnostics);
         scene_checks::gases_of_plants(&model, diagnostics);
+        scene_checks::soil(&model, diagnostics);
         sheets::modules(&model, &all, diagnostics);
         scene_checks::solids(&model, occurs, drawn, diagnostics);
         check::commands(&model, diagnostics, &all);

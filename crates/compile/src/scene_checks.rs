@@ -189,3 +189,21 @@ pub fn gases_of_plants(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
         }
     }
 }
+
+/// Warns of gas that ground of soil does not stop, and of shelves without a ground whose material they could carry.
+pub fn soil(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
+    let scenery = &model.scenery;
+    match (&scenery.bed, scenery.shelves.first()) {
+        (Some(bed), _) if !scenery.gases.is_empty() => diagnostics.push(
+            Diagnostic::warning("gas goes through ground of soil")
+                .at(bed.span, "blobs that sink are not held up here")
+                .help("`ground H` alone holds them up; or let the gas rise: `fall -0.1`"),
+        ),
+        (None, Some((_, span))) => diagnostics.push(
+            Diagnostic::warning("`shelf` does nothing here")
+                .at(*span, "there is no ground of soil whose material it could carry")
+                .help("declare one, and what falls: `soil powder = snow`, `ground powder cell 0.01 depth 0.3`, `pour powder rate 0.02`"),
+        ),
+        _ => (),
+    }
+}

@@ -181,9 +181,9 @@ fn row(
             format!("nothing that has been let go is drawn at {when}"),
         );
     }
-    let ends = match scene.scenery.ground {
-        Some(_) => "until it lies still on the ground; from then on there is nothing to do",
-        None => "without end, because there is no `ground`",
+    let ends = match scene.scenery.ground.is_some() || scene.scenery.bed.is_some() {
+        true => "until it lies still on the ground; from then on there is nothing to do",
+        false => "without end, because there is no `ground`",
     };
     let ticks = brief((t * second / CLOCK).ceil(), 6);
     let why = format!(

@@ -78,6 +78,8 @@ fn solid(model: &Model) -> Option<ScenePart> {
     let part = format!("solid {}", names.join(" "));
     match (names.is_empty(), sways(model) || turtle::lets_out(model) || turtle::drapes(model)) {
         (true, _) => None,
+        // What is said of the ground names them.
+        (_, false) if model.scenery.bed.is_some() => None,
         (_, false) => {
             let why = "nothing in the scene feels the wind: no stem gives way, nothing is let go, and there is no gas or sheet";
             Some(ScenePart::new(part, "nothing to do", why))
