@@ -1,5 +1,7 @@
 //! The fall of one body: a pure function of its release, evaluated at any time in any order.
 
+use std::collections::VecDeque;
+
 use crate::error::check;
 use crate::forces::Dynamics;
 use crate::motion::Packed;
@@ -63,8 +65,8 @@ const MOST_JOLTS: usize = 1024;
 /// The motion of a body after its release.
 ///
 /// The result of [`at`](Fall::at) depends on what was given to [`new`](Fall::new) and on the wind only, not on the times asked for
-/// before: steps are those of the error. Going on costs the steps in between; going back costs some of them again, from the nearest of at most
-/// 16 states that are kept.
+/// before: steps are those of the error. Going on costs the steps in between; going back costs nothing within the last steps
+/// ([`keep_steps`](Fall::keep_steps)), and beyond them some steps again, from the nearest of at most 16 states that are kept.
 #[derive(Clone, Debug)]
 pub struct Fall {
     rules: Rules,
@@ -75,6 +77,9 @@ pub struct Fall {
     /// States in the order of time: every `stride` steps.
     kept: Vec<State>,
     stride: u64,
+    /// The last steps up to the latest time, without gaps, and how many there may be.
+    recent: VecDeque<Step>,
+    most_recent: usize,
     /// The state at rest.
     rest: Option<State>,
     /// Times at which the velocity jumped.
@@ -122,6 +127,8 @@ impl Fall {
             state,
             kept: Vec::new(),
             stride: 8,
+            recent: VecDeque::new(),
+            most_recent: 0,
             rest: None,
             jolts: Vec::new(),
         })
@@ -164,6 +171,13 @@ impl Fall {
         [dynamics.kinetic_energy(motion), dynamics.potential_energy(motion)]
     }
 
+    /// Keeps so many of the last steps (0 at first), of some 400 bytes each. Results do not depend on it.
+    pub fn keep_steps(&mut self, most: usize) {
+        self.most_recent = most;
+        let surplus = self.recent.len().saturating_sub(most);
+        self.recent.drain(..surplus);
+    }
+
     /// The motion at a time in s. Before the release it is that at the release.
     ///
     /// # Errors
@@ -178,6 +192,10 @@ impl Fall {
             return Ok(rest.motion);
         }
         if self.step.is_some_and(|step| time < step.start) {
+            let passed = self.recent.partition_point(|step| step.end <= time);
+            if let Some(step) = self.recent.get(passed).filter(|step| step.start <= time) {
+                return Ok(step.at(time));
+            }
             let after = self.kept.partition_point(|state| state.time <= time);
             self.state = after.checked_sub(1).map_or(self.release, |index| self.kept[index]);
             self.step = None;
@@ -197,7 +215,7 @@ impl Fall {
             self.note(step.start, &before, &step.first);
             self.note(step.end, &step.last, &next.motion);
             (self.step, self.state) = (Some(step), next);
-            self.keep();
+            self.keep(&step);
             if next.steps > self.rules.settings.steps {
                 let from = self.release.time;
                 return Err(Error::Steps { from, steps: next.steps, time: next.time });
@@ -230,9 +248,15 @@ impl Fall {
         }
     }
 
-    /// Keeps the state for going back, if it is new and its turn has come. Twice as many steps lie between those kept when there are too
-    /// many.
-    fn keep(&mut self) {
+    /// Keeps a step and the state after it for going back, if they are new; of states those whose turn has come. Twice as many steps lie between those
+    /// kept when there are too many.
+    fn keep(&mut self, step: &Step) {
+        if self.most_recent > 0 && self.recent.back().is_none_or(|last| last.end <= step.start) {
+            if self.recent.len() >= self.most_recent {
+                self.recent.pop_front();
+            }
+            self.recent.push_back(*step);
+        }
         let due = self.state.steps.is_multiple_of(self.stride);
         if !due || self.kept.last().is_some_and(|last| last.steps >= self.state.steps) {
             return;

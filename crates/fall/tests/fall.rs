@@ -24,6 +24,30 @@ fn any_order_of_times_gives_the_same_bits() -> Result<(), Error> {
         let index = (k * 337 + 500) % 800;
         assert_eq!(jumping.at(times[index], &wind)?, expected[index], "{}", times[index]);
     }
+    // With few steps, with all of them, and with another number on the way.
+    for most in [1, 7, 1000] {
+        let mut keeping = petal()?;
+        keeping.keep_steps(most);
+        for k in 0..800 {
+            let index = (k * 337 + 500) % 800;
+            assert_eq!(keeping.at(times[index], &wind)?, expected[index], "{most}: {}", times[index]);
+            if k == 400 {
+                keeping.keep_steps(most / 2);
+            }
+        }
+    }
+    // Those that are kept are not computed again.
+    let mut keeping = petal()?;
+    keeping.keep_steps(1000);
+    let calls = std::cell::Cell::new(0);
+    let counted = |point: Vector, time: f64| {
+        calls.set(calls.get() + 1);
+        wind(point, time)
+    };
+    keeping.at(times[799], &counted)?;
+    let before = calls.replace(0);
+    times.iter().try_for_each(|time| keeping.at(*time, &counted).map(drop))?;
+    assert!(before > 100 && calls.get() == 0, "{before} and {}", calls.get());
     let mut backward = petal()?;
     for index in (0..800).rev() {
         assert_eq!(backward.at(times[index], &wind)?, expected[index], "{}", times[index]);

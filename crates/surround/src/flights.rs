@@ -26,6 +26,9 @@ use crate::weather::{Gusts, Sampler};
 
 /// Most parts that one model may let go.
 const MOST_PARTS: usize = 100_000;
+/// Steps of the first flights that are kept for going back, and of one; the n-th has an n-th part of them.
+const MOST_STEPS: usize = 40_000;
+const MOST_STEPS_OF_ONE: usize = 4000;
 /// Seconds by which flights go on in turn: they read the same instants of the wind, few enough that all are kept until the last
 /// one has read them.
 const TURN: f64 = 1.0 / 8.0;
@@ -202,7 +205,10 @@ impl<'m> Flights<'m> {
                         Some(bed.surface(at.x, at.z) * place.units.length)
                     };
                     let ground = place.ground.or_else(level).map(Ground::at);
-                    let fall = Fall::new(loose.body, motion, time, ground, self.settings).map_err(failed)?;
+                    let mut fall =
+                        Fall::new(loose.body, motion, time, ground, self.settings).map_err(failed)?;
+                    // For files that play, whose times go to and fro.
+                    fall.keep_steps((MOST_STEPS / (self.releases.len() + 1)).min(MOST_STEPS_OF_ONE));
                     Release { begin: time, origin: part.origin, fall: Some(fall), offset, axes }
                 }
                 None => {
