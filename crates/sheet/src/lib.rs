@@ -7,7 +7,7 @@
 //!
 //! - [`Mesh`]: points, faces, cords; [`Tissue`]: stiffness, density, damping, thickness; [`Sheet`]: masses and springs of both.
 //! - [`State`]: places and velocities; [`Solver`]: advances it with controlled error; [`Step`] is the solution within a step.
-//! - [`Solid`]: a convex [`Shape`] that is guided along a path or free; a floor is a half-space. [`Push`]: what the sheet does to it.
+//! - [`Solid`]: a convex [`Shape`] that is guided along a path, free, or [`Led`] by equations of motion that stand elsewhere; a floor is a half-space. [`Push`]: what the sheet does to it.
 //! - [`Run`]: a state at any time, in any order.
 //! - [`study`]: exact cases with their errors and orders.
 //!
@@ -76,7 +76,7 @@ mod state;
 mod step;
 pub mod study;
 
-pub use contact::{Drive, Grip, Place, Push, Shape, Solid};
+pub use contact::{Drive, Grip, Led, Place, Push, Shape, Solid};
 pub use dlsys_wind::{Still, Wind};
 pub use drag::Air;
 pub use error::{Error, Rejection};

@@ -4,11 +4,28 @@ use crate::contact::Contact;
 use crate::matrix::{Blocks, Pattern};
 use crate::{Matrix, Vector};
 
-/// A free solid in the system: mass, and inertia in the axes of the world.
+/// A solid that forces move in the system: mass, and inertia in the axes of the world.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Free {
     pub mass: f64,
     pub inertia: Matrix,
+    /// Of a solid that is led, the root of the inverse mass, by which its unknown moves it; it has no spin of its own.
+    pub root: Option<Matrix>,
+}
+
+impl Free {
+    /// Motion by the first unknown. Also the force on it, as the root is symmetric.
+    pub fn way(&self, unknown: &Vector) -> Vector {
+        self.root.map_or(*unknown, |root| root * unknown)
+    }
+
+    /// Adds minus a force at an arm to the forces on both unknowns.
+    pub fn press(&self, force: &Vector, arm: &Vector, out: &mut [Vector]) {
+        out[0] -= self.way(force);
+        if self.root.is_none() {
+            out[1] -= arm.cross(force);
+        }
+    }
 }
 
 /// The matrix of a step. Unknowns are the points, then two vectors for each free solid: velocity and spin.
@@ -45,16 +62,17 @@ pub(crate) struct Bodies<'a> {
     pub points: usize,
     /// The number of each solid among the free ones.
     pub numbers: &'a [Option<usize>],
+    pub free: &'a [Free],
 }
 
 impl Bodies<'_> {
-    fn start(&self, contact: &Contact) -> Option<usize> {
-        self.numbers[contact.solid].map(|number| self.points + 2 * number)
+    fn body(&self, contact: &Contact) -> Option<(usize, &Free)> {
+        self.numbers[contact.solid].map(|number| (self.points + 2 * number, &self.free[number]))
     }
 
     /// Motion of an element relative to its solid.
     pub fn relative(&self, contact: &Contact, x: &[Vector]) -> Vector {
-        contact.relative(x, self.start(contact).map(|start| (x[start], x[start + 1])))
+        contact.relative(x, self.body(contact).map(|(start, free)| (free.way(&x[start]), x[start + 1])))
     }
 
     /// Adds the forces `-C u` of contacts for relative motions u, with a matrix C for each contact.
@@ -68,9 +86,8 @@ impl Bodies<'_> {
         for contact in contacts {
             let force = -(matrix(contact) * self.relative(contact, x));
             contact.spread(&force, out);
-            if let Some(start) = self.start(contact) {
-                out[start] -= force;
-                out[start + 1] -= contact.arm.cross(&force);
+            if let Some((start, free)) = self.body(contact) {
+                free.press(&force, &contact.arm, &mut out[start..]);
             }
         }
     }
@@ -82,7 +99,7 @@ impl System<'_> {
     }
 
     fn bodies(&self) -> Bodies<'_> {
-        Bodies { points: self.points(), numbers: self.numbers }
+        Bodies { points: self.points(), numbers: self.numbers, free: self.free }
     }
 
     fn block(&self, contact: &Contact) -> Matrix {
@@ -124,8 +141,13 @@ impl System<'_> {
             }
             if let Some(number) = self.numbers[contact.solid] {
                 let cross = contact.arm.cross_matrix();
-                inverse[points + 2 * number] += block;
-                inverse[points + 2 * number + 1] += cross.transpose() * block * cross;
+                match self.free[number].root {
+                    Some(root) => inverse[points + 2 * number] += root * block * root,
+                    None => {
+                        inverse[points + 2 * number] += block;
+                        inverse[points + 2 * number + 1] += cross.transpose() * block * cross;
+                    }
+                }
             }
         }
         for (index, block) in inverse.iter_mut().enumerate() {

@@ -148,7 +148,7 @@ impl Solver {
         if aligned { level - 1 } else { level }
     }
 
-    /// Energies of a state at a time (s).
+    /// Energies of a state at a time (s). Solids that are led have none: their mass is not known here.
     pub fn energy(&self, sheet: &Sheet, state: &State, time: f64, solids: &[Solid]) -> Energy {
         let gravity = self.settings.air.gravity;
         let mut energy = Energy { elastic: sheet.elastic_energy(&state.positions), ..Energy::default() };
@@ -171,6 +171,10 @@ impl Solver {
                     energy.kinetic += 0.5 * mass * body.velocity.norm_squared();
                     energy.kinetic += 0.5 * spin.component_mul(&spin).dot(&Vector::from(inertia));
                     *body
+                }
+                Drive::Led(led) => {
+                    let Some(body) = bodies.next() else { continue };
+                    led.place(time, body)
                 }
             };
             sheet.contacts((index, solid), &place, &state.positions, &state.velocities, &mut contacts);
@@ -204,8 +208,10 @@ fn check(around: Around, state: &State, time: f64) -> Result<(), Error> {
     }
     for solid in solids {
         solid.check()?;
-        if let Drive::Guided(path) = solid.drive {
-            path(time).check()?;
+        match solid.drive {
+            Drive::Guided(path) => path(time).check()?,
+            Drive::Led(led) => led.path(time).check()?,
+            Drive::Free { .. } => {}
         }
     }
     Ok(())

@@ -137,7 +137,7 @@ impl Newton {
         self.change[..points].iter().for_each(|change| meet(change.norm() * s));
         let reaches = around.solids.iter().filter(|solid| solid.is_free()).map(|solid| solid.shape.reach());
         for (number, reach) in reaches.enumerate() {
-            meet(self.change[points + 2 * number].norm() * s);
+            meet(self.free[number].way(&self.change[points + 2 * number]).norm() * s);
             meet(self.change[points + 2 * number + 1].norm() * s * reach);
         }
         size
@@ -165,15 +165,16 @@ impl Newton {
         for (index, solid) in solids.iter().enumerate() {
             sheet.contacts((index, solid), &self.places[index], x, v, &mut self.contacts);
         }
-        for (number, free) in self.free.iter().enumerate() {
-            self.forces[points + 2 * number] = settings.air.gravity * free.mass;
+        for (solid, number) in solids.iter().zip(&self.numbers) {
+            if let Some(number) = number {
+                self.forces[points + 2 * number] = solid.load(time, &settings.air.gravity);
+            }
         }
         for contact in &self.contacts {
             contact.spread(&contact.force, &mut self.forces);
             if let Some(number) = self.numbers[contact.solid] {
-                let start = points + 2 * number;
-                self.forces[start] -= contact.force;
-                self.forces[start + 1] -= contact.arm.cross(&contact.force);
+                let forces = &mut self.forces[points + 2 * number..];
+                self.free[number].press(&contact.force, &contact.arm, forces);
             }
         }
         self.right.clear();
@@ -236,7 +237,7 @@ impl Newton {
 
     /// Adds the impulses on solids by the contacts of the last stage, for a time `h`.
     pub fn push(&self, points: usize, s: f64, h: f64, pushes: &mut [Push]) {
-        let bodies = Bodies { points, numbers: &self.numbers };
+        let bodies = Bodies { points, numbers: &self.numbers, free: &self.free };
         for contact in &self.contacts {
             // The last change is part of the state.
             let change = bodies.relative(contact, &self.change);

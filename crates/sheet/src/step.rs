@@ -80,8 +80,15 @@ pub(crate) fn places(solids: &[Solid], time: f64, bodies: &[Place], out: &mut Ve
         out.extend(match solid.drive {
             Drive::Guided(path) => Some(path(time)),
             Drive::Free { .. } => bodies.next().copied(),
+            Drive::Led(led) => bodies.next().map(|deviation| led.place(time, deviation)),
         });
     }
+}
+
+/// By how much a path is faster in a step of length h, or at its end, than at its beginning.
+fn later(solid: &Solid, [start, end]: [Place; 2], h: f64) -> f64 {
+    let faster = (end.velocity - start.velocity).norm();
+    faster.max((end.position - start.position).norm() / h - start.velocity.norm()) + turning(solid, end.spin)
 }
 
 /// The largest speed of a solid by its spin. A floor does not turn.
@@ -91,9 +98,15 @@ fn turning(solid: &Solid, spin: Vector) -> f64 {
 
 /// The inertia about the axes of the world.
 pub(crate) fn inertia(solid: &Solid, place: &Place) -> Option<Free> {
-    let Drive::Free { mass, inertia } = solid.drive else { return None };
-    let axes = place.attitude.to_rotation_matrix().into_inner();
-    Some(Free { mass, inertia: axes * Matrix::from_diagonal(&Vector::from(inertia)) * axes.transpose() })
+    match solid.drive {
+        Drive::Guided(_) => None,
+        Drive::Led(led) => Some(Free { mass: 1.0, inertia: Matrix::identity(), root: Some(led.root()) }),
+        Drive::Free { mass, inertia } => {
+            let axes = place.attitude.to_rotation_matrix().into_inner();
+            let inertia = axes * Matrix::from_diagonal(&Vector::from(inertia)) * axes.transpose();
+            Some(Free { mass, inertia, root: None })
+        }
+    }
 }
 
 impl Workspace {
@@ -202,9 +215,15 @@ impl Workspace {
         let untouched = |solid: usize| self.touching[1..].iter().flatten().all(|contact| contact.0 != solid);
         for (solid, number) in self.newton.numbers.iter().enumerate() {
             if let Some(number) = number.filter(|_| untouched(solid)) {
-                let fall = around.settings.air.gravity * (0.5 * h * h);
                 let body = &start.bodies[number];
+                let mean = |part: f64| {
+                    let load = solids[solid].load(time + part * h, &around.settings.air.gravity);
+                    load / self.newton.free[number].mass
+                };
+                // A load that is linear in time counts as in its first third.
+                let fall = mean(1.0 / 3.0) * (0.5 * h * h);
                 after.bodies[number].position = body.position + body.velocity * h + fall;
+                after.bodies[number].velocity = body.velocity + mean(0.5) * h;
             }
         }
         Ok(())
@@ -243,12 +262,10 @@ impl Workspace {
             let radius = solid.shape.radius();
             let now = before.velocities.iter().map(|v| (v - place.velocity).norm_squared());
             let later = match solid.drive {
-                Drive::Guided(path) => {
-                    let end = path(time + h);
-                    (end.velocity - place.velocity)
-                        .norm()
-                        .max((end.position - place.position).norm() / h - place.velocity.norm())
-                        + turning(solid, end.spin)
+                Drive::Guided(path) => later(solid, [*place, path(time + h)], h),
+                Drive::Led(led) => {
+                    later(solid, [time, time + h].map(|time| led.path(time)), h)
+                        + (led.root() * solid.load(time, &Vector::zeros())).norm() * h
                 }
                 Drive::Free { .. } => around.settings.air.gravity.norm() * h,
             };
@@ -335,7 +352,7 @@ impl Workspace {
         let bodies = self.start.bodies.iter().zip(&self.middle.bodies).zip(&after.bodies);
         for (number, ((v, w), u)) in bodies.enumerate() {
             let (way, change) = errors(v.velocity, w.velocity, u.velocity);
-            found.meet(way.norm(), points + number);
+            found.meet(self.newton.free[number].way(&way).norm(), points + number);
             self.changes.extend([change, errors(v.spin, w.spin, u.spin).1]);
         }
         if settings.fixed || !found.displacement.is_finite() {
@@ -350,7 +367,8 @@ impl Workspace {
             found.meet(value.norm() * span, k);
         }
         for number in 0..self.start.bodies.len() {
-            found.meet(self.changes[points + 2 * number].norm() * settings.longest, points + number);
+            let change = self.newton.free[number].way(&self.changes[points + 2 * number]);
+            found.meet(change.norm() * settings.longest, points + number);
         }
         Ok(found)
     }

@@ -31,13 +31,19 @@ pub(crate) struct Impact {
     drag: Vector,
 }
 
+/// What impulses and impulsive moments do to a solid.
+struct Agility {
+    light: Matrix,
+    agile: Matrix,
+}
+
 /// Solids and sheet before and after impulses.
 pub(crate) struct Moving<'a> {
     pub sheet: &'a Sheet,
     /// Velocities change.
     pub state: &'a mut State,
-    /// The solids at the start.
-    pub places: &'a [Place],
+    /// The solids at the start. Velocities change.
+    pub places: &'a mut [Place],
     pub numbers: &'a [Option<usize>],
     pub free: &'a [Free],
 }
@@ -48,21 +54,22 @@ impl Moving<'_> {
         if self.sheet.pinned[point] { 0.0 } else { 1.0 / self.sheet.masses[point] }
     }
 
-    /// Inverse of mass and inertia of a solid, if it is free.
-    fn agility(&self, solid: usize) -> Option<(usize, f64, Matrix)> {
-        let number = self.numbers[solid]?;
-        let free = &self.free[number];
-        Some((number, 1.0 / free.mass, free.inertia.try_inverse().unwrap_or_else(Matrix::zeros)))
+    /// Inverse of mass and inertia of a solid, if forces move it.
+    fn agility(&self, solid: usize) -> Option<Agility> {
+        let free = &self.free[self.numbers[solid]?];
+        Some(match free.root {
+            Some(root) => Agility { light: root * root, agile: Matrix::zeros() },
+            None => {
+                let light = Matrix::from_diagonal_element(1.0 / free.mass);
+                Agility { light, agile: free.inertia.try_inverse().unwrap_or_else(Matrix::zeros) }
+            }
+        })
     }
 
     fn relative(&self, impact: &Impact) -> Vector {
         let v = &self.state.velocities;
         let element: Vector = (0..3).map(|k| v[impact.points[k]] * impact.weights[k]).sum();
-        let place = match self.numbers[impact.solid] {
-            Some(number) => &self.state.bodies[number],
-            None => &self.places[impact.solid],
-        };
-        element - place.velocity_at(&impact.arm)
+        element - self.places[impact.solid].velocity_at(&impact.arm)
     }
 
     fn strike(&mut self, impact: &Impact, impulse: &Vector) {
@@ -71,11 +78,14 @@ impl Moving<'_> {
             let gain = impulse * (impact.weights[k] * self.lightness(point));
             self.state.velocities[point] += gain;
         }
-        if let Some((number, light, agile)) = self.agility(impact.solid) {
-            let body = &mut self.state.bodies[number];
-            body.velocity -= impulse * light;
-            body.spin -= agile * impact.arm.cross(impulse);
-        }
+        let Some(number) = self.numbers[impact.solid] else { return };
+        let Some(Agility { light, agile }) = self.agility(impact.solid) else { return };
+        let (place, body) = (&mut self.places[impact.solid], &mut self.state.bodies[number]);
+        let turn = agile * impact.arm.cross(impulse);
+        place.velocity -= light * impulse;
+        place.spin -= turn;
+        body.velocity -= self.free[number].root.map_or_else(|| light * impulse, |root| root * impulse);
+        body.spin -= turn;
     }
 
     /// Finds contacts with a solid whose gap is below `margin`, for a step of length `h`.
@@ -92,10 +102,10 @@ impl Moving<'_> {
             let arm = point - place.position;
             let own: f64 = (0..3).map(|k| weights[k] * weights[k] * self.lightness(points[k])).sum();
             let mut response = [own; 2];
-            if let Some((_, light, agile)) = &agile {
+            if let Some(Agility { light, agile }) = &agile {
                 let turn = arm.cross(&gap.normal);
-                response[0] += light + turn.dot(&(agile * turn));
-                response[1] += light + agile.trace() * arm.norm_squared();
+                response[0] += gap.normal.dot(&(light * gap.normal)) + turn.dot(&(agile * turn));
+                response[1] += light.norm() + agile.trace() * arm.norm_squared();
             }
             let least = -gap.width.max(0.0) / h;
             let (normal, pressure, drag) = (gap.normal, 0.0, Vector::zeros());

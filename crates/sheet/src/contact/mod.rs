@@ -5,12 +5,14 @@
 //! are as long as motion allows, not as short as the stiffness of the contact requires.
 
 mod impact;
+mod led;
 mod nearest;
 mod shape;
 
 use crate::error::check;
 use crate::{Error, Matrix, Sheet, Vector};
 pub(crate) use impact::{Impact, Moving};
+pub use led::Led;
 pub(crate) use shape::press;
 pub use shape::{Gap, Grip, Place, Shape};
 
@@ -26,6 +28,8 @@ pub enum Drive<'a> {
         /// Moments of inertia about its axes, through the centre of mass, in kg m².
         inertia: [f64; 3],
     },
+    /// A path that is computed elsewhere, and what forces add to it. The deviation is in the state.
+    Led(Led<'a>),
 }
 
 /// A solid that a sheet meets.
@@ -43,6 +47,11 @@ impl<'a> Solid<'a> {
     /// A solid on a path.
     pub fn guided(shape: &'a Shape, path: &'a dyn Fn(f64) -> Place) -> Solid<'a> {
         Solid { shape, drive: Drive::Guided(path), grip: Grip::default() }
+    }
+
+    /// A solid whose motion is computed elsewhere, with what forces add to it.
+    pub fn led(shape: &'a Shape, led: Led<'a>) -> Solid<'a> {
+        Solid { shape, drive: Drive::Led(led), grip: Grip::default() }
     }
 
     /// A free ball of homogeneous material with a mass in kg.
@@ -67,8 +76,18 @@ impl<'a> Solid<'a> {
         Ok(())
     }
 
+    /// True if forces move it, so that the state has a place for it.
     pub(crate) fn is_free(&self) -> bool {
-        matches!(self.drive, Drive::Free { .. })
+        !matches!(self.drive, Drive::Guided(_))
+    }
+
+    /// The force of what is no sheet on its unknowns, in N: weight, or minus the force with which its path was computed.
+    pub(crate) fn load(&self, time: f64, gravity: &Vector) -> Vector {
+        match self.drive {
+            Drive::Guided(_) => Vector::zeros(),
+            Drive::Free { mass, .. } => gravity * mass,
+            Drive::Led(led) => -led.root() * led.assumed(time),
+        }
     }
 
     /// The depth at which contacts are infinitely stiff, in m.
