@@ -78,8 +78,8 @@ fn at_times(times: &[f64], places: &mut Places, sampler: &mut Sampler) -> Result
 }
 
 /// Evaluates and prints.
-struct Sampler<'a> {
-    weather: &'a Weather<'a>,
+struct Sampler<'a, 'm> {
+    weather: &'a Weather<'m>,
     /// The message of an error of the model.
     fault: &'a dyn Fn(Error) -> Failure,
     units: Units,
@@ -89,7 +89,7 @@ struct Sampler<'a> {
     out: BufWriter<std::io::StdoutLock<'static>>,
 }
 
-impl Sampler<'_> {
+impl Sampler<'_, '_> {
     fn head(&mut self) -> Result<(), Failure> {
         match self.format {
             TextFormat::Text => self.out.write_all(b"t,x,y,z,u,v,w\n").map_err(out_error),

@@ -11,7 +11,7 @@ use crate::common::repository;
 use crate::glb::{self, follow, random_times};
 
 /// A cloth of 4 by 4 squares, 1 by 1 in the plane y = 0.
-fn cloth() -> String {
+pub fn cloth() -> String {
     let mut text = String::new();
     for k in 0..25 {
         text += &format!("v {} 0 {}\n", (k % 5) as f64 / 4.0, (k / 5) as f64 / 4.0);
@@ -28,7 +28,7 @@ const CLOTH: &str = "tissue silk = stiffness 1e6, density 1000, damping 0.1, thi
 sheet @Cloth from \"cloth.obj\" of silk pinned x < 0.01 | x > 0.99\n";
 
 /// A model beside a mesh.
-fn with_mesh(text: &str, mesh: &str) -> Result<Session, String> {
+pub fn with_mesh(text: &str, mesh: &str) -> Result<Session, String> {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("cloth.obj"), mesh).expect("written");
     let path = folder.path().join("model.dls");
@@ -242,7 +242,7 @@ fn the_net_of_the_book_opens_for_the_ball() {
     };
     let before = widest(&draw(&nursery, &session, 0.05));
     let within = widest(&draw(&nursery, &session, 0.44));
-    assert!(before < 0.115 && within > 0.12, "{before} and {within}");
+    assert!(before < 0.118 && within > 0.122, "{before} and {within}");
 }
 
 #[test]

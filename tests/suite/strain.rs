@@ -54,7 +54,10 @@ impl Surroundings for Known {
         Ok(())
     }
 
-    fn boxed_clone(&self) -> Box<dyn Surroundings> {
+    fn boxed_clone<'a>(&self) -> Box<dyn Surroundings + 'a>
+    where
+        Self: 'a,
+    {
         Box::new(self.clone())
     }
 
@@ -285,7 +288,10 @@ impl Surroundings for Failing {
         Ok(())
     }
 
-    fn boxed_clone(&self) -> Box<dyn Surroundings> {
+    fn boxed_clone<'a>(&self) -> Box<dyn Surroundings + 'a>
+    where
+        Self: 'a,
+    {
         Box::new(self.clone())
     }
 

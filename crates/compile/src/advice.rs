@@ -3,6 +3,7 @@
 //! A remedy often depends on more of the text than the place of the error. The functions that derive it are collected
 //! here, so that the passes stay readable.
 
+use crate::inputs;
 use crate::scope::{RESERVED, Variables};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{Class, ELASTIC, Kinds, SOURCE};
@@ -92,8 +93,12 @@ pub fn not_a_parameter(name: &Name, head: &HeadModule, variables: &Variables) ->
     if variables.lets.contains_key(&name.text) {
         return error.help("a `let` names an expression; nothing is stored that could be solved");
     }
-    if &*name.text == crate::strain::NAME {
-        return error.help("`strain` follows from the bending of stems; to compute one of your own, give the module a parameter of that name");
+    if let Some(quantity) = inputs::named(&name.text) {
+        let from = if quantity.is_force() { "what sheets do to the solid" } else { "the bending of stems" };
+        return error.help(format!(
+            "`{}` follows from {from}; to compute one of your own, give the module a parameter of that name",
+            quantity.name()
+        ));
     }
     if variables.names.contains_key(&name.text) && !RESERVED.contains(&&*name.text) {
         return error

@@ -11,11 +11,11 @@ use crate::analysis::{Analysed, analyse};
 use crate::chance::Clocks;
 use crate::clauses::names_of;
 use crate::declared::DeclaredRule;
+use crate::inputs::{self, Inputs};
 use crate::rules::RuleBuilder;
 use crate::scene_checks::MaterialNumber;
 use crate::scenery::Nesting;
 use crate::scope::{Scope, Variables};
-use crate::strain::{self, Strains};
 use crate::{
     Setting, appearance, check, contexts, dead_rules, globals, porting, scene_checks, scenery, sheets,
 };
@@ -42,7 +42,7 @@ pub fn build(
     let appearance = appearance::build(document, scope, files);
     let scenery = scenery::build(document, &appearance, scope, files, nesting);
     let mut kinds = Kinds::default();
-    let hidden = (Clocks::new(document), Strains::new(document, scope));
+    let hidden = (Clocks::new(document), Inputs::new(document, scope));
     let mut builder = RuleBuilder::new(document, scope, &mut kinds, hidden);
     let mut parts = Parts::default();
     for (item, span) in &document.items {
@@ -50,7 +50,7 @@ pub fn build(
     }
     parts.check_strings(&mut builder, unread);
     porting::comments(document, &mut builder.scope.diagnostics);
-    let RuleBuilder { occurs, drawn, clocks, strains, materials, .. } = builder;
+    let RuleBuilder { occurs, drawn, clocks, inputs, materials, .. } = builder;
     if !parts.singles.seen(INITIAL_STRING) && !unread {
         scope.diagnostics.push(
             Diagnostic::error("the model has no initial string")
@@ -69,7 +69,7 @@ pub fn build(
     }
     let places = Places { occurs, drawn, materials };
     let looks = Looks { parameters, appearance, scenery };
-    Some(parts.model(document, kinds, (&clocks, &strains), &places, looks, scope))
+    Some(parts.model(document, kinds, (&clocks, &inputs), &places, looks, scope))
 }
 
 /// Declarations that were lowered before the rules.
@@ -201,7 +201,7 @@ impl<'d> Parts<'d> {
         self,
         document: &Document,
         mut kinds: Kinds,
-        (clocks, strains): (&Clocks, &Strains),
+        (clocks, inputs): (&Clocks, &Inputs),
         places: &Places,
         looks: Looks,
         scope: &mut Scope,
@@ -215,7 +215,7 @@ impl<'d> Parts<'d> {
             }
         }
         clocks.assign(&mut kinds);
-        strains.assign(&mut kinds);
+        inputs.assign(&mut kinds);
         let diagnostics = &mut scope.diagnostics;
         let interpretations = assign_interpretations(self.interpretations, &mut kinds, diagnostics);
         contexts::filter(&mut kinds, &self.ignored, &self.considered, diagnostics);
@@ -244,7 +244,7 @@ impl<'d> Parts<'d> {
             check::reachability(&model, &self.written, occurs, diagnostics);
         }
         check::period(self.period, &model, diagnostics);
-        strain::check(&model, strains.first, diagnostics);
+        inputs::check(&model, inputs, diagnostics);
         check::coverage(&model, diagnostics);
         dead_rules::rules(&model, &self.written, document, diagnostics);
         check::inert_modules(&model, occurs, diagnostics);

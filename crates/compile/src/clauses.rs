@@ -7,11 +7,12 @@ use crate::chance::{Hazard, production_keys};
 use crate::conditions::Atoms;
 use crate::declared::{DeclaredRule, DeclaredSolve};
 use crate::equations::Equations;
+use crate::inputs::Handing;
 use crate::rules::RuleBuilder;
 use crate::scope::Variables;
 use dlsys_diagnostic::Span;
 use dlsys_expr::{Graph, NodeId};
-use dlsys_model::{Clock, Condition, ContextPart, Produce, Switch};
+use dlsys_model::{Clock, Condition, ContextPart, Input, Produce, Switch};
 use dlsys_syntax::ast::{self, Action, HeadModule};
 use dlsys_syntax::print;
 
@@ -62,16 +63,16 @@ impl RuleBuilder<'_> {
         let written = self.aggregates_in(rule);
         let own = rule.predecessor.parameters.len() + self.hidden(&rule.predecessor);
         let (mut variables, count) = self.variables(&rule.predecessor, &rule.left, &rule.right, written);
-        self.name_strain(rule, &mut variables);
+        self.name_inputs(rule, &mut variables);
         self.scope.comparisons.clear();
         self.scope.gathered.clear();
         good &= self.locals(rule, &mut variables);
         let frame = Frame { rule, variables, own, count };
         let mut atoms = Atoms::default();
         let guards = self.guards(&frame, &mut atoms, &mut good);
-        self.parent_strain = self.strain_parameter(&rule.predecessor);
+        self.begin_handing(&rule.predecessor);
         let productions = self.productions(&frame, &guards, &mut atoms, &mut good);
-        self.parent_strain = None;
+        self.handing = Handing::default();
         let productions = productions?;
         let smooth = self.smooth_clauses(&frame, &guards, &productions, &mut atoms, &mut good)?;
         if !good {
@@ -180,18 +181,18 @@ impl RuleBuilder<'_> {
                 continue;
             };
             equations.rates.extend(hazards.iter().filter_map(|hazard| self.clock_rate(hazard, guard.node)));
-            equations.rates.extend(self.strain_rate(rule));
+            equations.rates.extend(self.input_rates(rule));
             let (smooth, switches) = self.smooth(equations.all(), own, count, clause.span, atoms)?;
             equations.set_all(smooth);
             all.push(Smooth { guard: guard.condition.clone(), span: clause.span, equations, switches });
         }
         let clock = productions.clocks.first();
-        let strain = self.strain_rate(rule);
-        if *good && all.is_empty() && (clock.is_some() || strain.is_some()) {
-            // Clocks and strains go on even if the rule has no other equation.
+        let inputs = self.input_rates(rule);
+        if *good && all.is_empty() && (clock.is_some() || !inputs.is_empty()) {
+            // Clocks and inputs go on even if the rule has no other equation.
             let span = clock.map_or(rule.head, |first| productions.produces[first.produce].span);
             let clocks = hazards.iter().filter_map(|hazard| self.clock_rate(hazard, None));
-            let rates = clocks.collect::<Vec<_>>().into_iter().chain(strain).collect();
+            let rates = clocks.collect::<Vec<_>>().into_iter().chain(inputs).collect();
             let (rates, switches) = self.smooth(rates, own, count, span, atoms)?;
             let equations = Equations { rates, algebraic: Vec::new() };
             all.push(Smooth { guard: Condition::default(), span, equations, switches });
@@ -225,8 +226,12 @@ impl RuleBuilder<'_> {
     fn names(&self, module: &HeadModule) -> Vec<String> {
         let (name, arity) = (&module.name.text, module.parameters.len());
         let clocks = std::iter::repeat_n("clock", self.clocks.width(name, arity));
-        let strain = ["strain", "slope of the strain"].into_iter().take(self.strains.of(name, arity).width());
-        let hidden = clocks.chain(strain).map(str::to_owned);
+        let of_input = |input: Input| {
+            let name = input.quantity.name();
+            [name.to_owned(), format!("slope of {name}")]
+        };
+        let inputs = self.inputs.of(name, arity).into_iter().flat_map(of_input);
+        let hidden = clocks.map(str::to_owned).chain(inputs);
         module.parameters.iter().map(|p| p.text.to_string()).chain(hidden).collect()
     }
 }

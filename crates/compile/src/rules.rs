@@ -6,9 +6,9 @@ use std::sync::Arc;
 use crate::advice;
 use crate::chance::Clocks;
 use crate::declared::DeclaredPattern;
+use crate::inputs::{Handing, Inputs};
 use crate::scene_checks::MaterialNumber;
 use crate::scope::{RESERVED, Scope, Variables};
-use crate::strain::Strains;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::NodeId;
 use dlsys_model::{CUT, Class, DRAWN_WORDS, Interpretation, KindId, Kinds, base_of, class_of};
@@ -21,9 +21,9 @@ pub struct RuleBuilder<'b> {
     pub scope: &'b mut Scope,
     pub kinds: &'b mut Kinds,
     pub clocks: Clocks,
-    pub strains: Strains,
-    /// The number of the strain among the variables of the rule that is being lowered, if its predecessor has one.
-    pub(super) parent_strain: Option<usize>,
+    pub inputs: Inputs,
+    /// What modules of the string that is being lowered take over from the module that they replace.
+    pub(super) handing: Handing,
     /// Number of brackets that are open around the part of a string that is being lowered.
     pub(super) open_around: usize,
     /// Each kind that occurs in a string, with its first place.
@@ -40,28 +40,17 @@ impl<'b> RuleBuilder<'b> {
         document: &'b Document,
         scope: &'b mut Scope,
         kinds: &'b mut Kinds,
-        (clocks, strains): (Clocks, Strains),
+        (clocks, inputs): (Clocks, Inputs),
     ) -> RuleBuilder<'b> {
         let (occurs, drawn, materials) = Default::default();
-        let (parent_strain, open_around) = (None, 0);
-        RuleBuilder {
-            document,
-            scope,
-            kinds,
-            clocks,
-            strains,
-            parent_strain,
-            open_around,
-            occurs,
-            drawn,
-            materials,
-        }
+        let (handing, open_around) = (Handing::default(), 0);
+        RuleBuilder { document, scope, kinds, clocks, inputs, handing, open_around, occurs, drawn, materials }
     }
 
     /// Number of hidden parameters of a module.
     pub(super) fn hidden(&self, module: &HeadModule) -> usize {
         let (name, arity) = (&module.name.text, module.parameters.len());
-        self.clocks.width(name, arity) + self.strains.of(name, arity).width()
+        self.clocks.width(name, arity) + 2 * self.inputs.of(name, arity).len()
     }
 
     /// A module of a context by name; its kinds are resolved later.
@@ -157,7 +146,7 @@ impl<'b> RuleBuilder<'b> {
             return None;
         }
         // Drawings and measures read the written parameters only.
-        let (clocks, strains) = (std::mem::take(&mut self.clocks), std::mem::take(&mut self.strains));
+        let (clocks, inputs) = (std::mem::take(&mut self.clocks), std::mem::take(&mut self.inputs));
         let (mut variables, count) = self.variables(head, &[], &[], 0);
         // They have no aggregates.
         variables.aggregates = None;
@@ -174,7 +163,7 @@ impl<'b> RuleBuilder<'b> {
         // A module that is only drawn does not develop and makes no rule reachable.
         let before = std::mem::take(&mut self.occurs);
         let drawn = self.string(drawn, &variables, count, false);
-        (self.clocks, self.strains) = (clocks, strains);
+        (self.clocks, self.inputs) = (clocks, inputs);
         let inside = std::mem::replace(&mut self.occurs, before);
         let kind = self.kinds.intern(&head.name.text, head.parameters.len());
         self.drawn.extend(inside.into_iter().filter(|(other, _)| *other != kind));

@@ -7,9 +7,10 @@ use std::sync::Arc;
 use crate::advice;
 use crate::call::Call;
 use crate::chance::Draws;
+use crate::inputs;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{Binary, Graph, Integral, Lookup, NodeId, Unary};
-use dlsys_model::{Comparison, Fold};
+use dlsys_model::{Comparison, Fold, Quantity};
 use dlsys_syntax::ast::{Aggregate, Expr, ExprId, Expression, Expressions, HeadModule, Name, Operator};
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::did_you_mean;
@@ -428,8 +429,8 @@ impl Scope {
             Diagnostic::error(format!("`{name}` has no meaning here"))
                 .at(span, "time is known in rules only")
                 .help(variables.no_time.unwrap_or("use it in a rule"))
-        } else if &**name == crate::strain::NAME {
-            crate::strain::misplaced(span)
+        } else if let Some(quantity) = inputs::named(name) {
+            inputs::misplaced(quantity, span)
         } else if self.curves.contains_key(name) {
             Diagnostic::error(format!("`{name}` is a curve"))
                 .at(span, "a function of one number")
@@ -450,7 +451,8 @@ impl Scope {
                 .chain(self.constants.keys().filter(|_| self.suggests()))
                 .map(|n| &**n)
                 .chain(RESERVED.into_iter().filter(|_| variables.no_time.is_none()))
-                .chain(["pi", crate::strain::NAME]);
+                .chain(std::iter::once("pi"))
+                .chain(Quantity::ALL.map(Quantity::name));
             let what = match variables.no_time {
                 None => "this is no parameter of the rule and no constant",
                 Some(_) => "this is no constant",

@@ -49,6 +49,7 @@ impl RuleBuilder<'_> {
         let mut weights = Vec::new();
         let mut successors = Vec::new();
         for Alternative { weight, modules } in all {
+            self.handing.restart();
             let successor = self.successor(modules, variables, count);
             let weight = weight.map(|w| self.scope.number(&self.document.expressions, w, variables));
             weights.extend(weight.flatten());
@@ -171,8 +172,11 @@ impl RuleBuilder<'_> {
         draws: bool,
     ) -> Option<Choice> {
         let condition = self.scope.condition(&self.document.expressions, of.condition, variables);
+        let before = self.handing.clone();
         let then = self.parts(&of.then, variables, count, draws);
+        let after = std::mem::replace(&mut self.handing, before);
         let otherwise = self.parts(&of.otherwise, variables, count, draws);
+        self.handing.join(&after);
         let condition = Program::compile(&self.scope.graph, &[condition?], count);
         Some(Choice { condition, then: then?, otherwise: otherwise? })
     }
@@ -237,7 +241,7 @@ impl RuleBuilder<'_> {
             }
             clocks.extend(self.clocks.for_new(&module.name, module.arguments.len(), place, roots.len()));
             let in_branch = !open.is_empty() || self.open_around > 0;
-            roots.extend(self.strain_of_new(module, in_branch));
+            roots.extend(self.inputs_of_new(module, in_branch));
             place += usize::from(!kind.is_bracket());
             if !kind.is_bracket() && places.len() < Stretch::PLACES {
                 places.push((kind, module.span));

@@ -54,28 +54,48 @@ pub struct Kind {
     /// The hidden parameters, which follow the written ones: the clocks of events at a rate, by the keys of their clauses.
     /// Kinds with the same base name and number of parameters have the same number of them.
     pub clocks: Vec<u64>,
-    /// The hidden parameters behind the clocks: `strain` and its rate of change.
-    pub strain: Strain,
+    /// What the surroundings give, in the order of [`Quantity`]: hidden parameters behind the clocks, a value and its rate of change for each.
+    pub inputs: Vec<Input>,
 }
 
-/// The hidden parameters for `strain` of a kind: its value, and the slope with which it goes on until the surroundings give the
-/// next value. Kinds with the same base name and number of parameters have the same number of them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Strain {
-    /// It has none.
-    #[default]
-    Absent,
-    /// It has them because another kind that the same context patterns match reads them; they stay 0.
-    Unread,
-    /// Some rule of the kind reads `strain`.
-    Read,
+/// A quantity that the surroundings give to modules, and that rules read by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Quantity {
+    /// `strain`: the largest bending strain of the stem that the module draws.
+    Strain,
+    /// `force_x`, `force_y`, `force_z`: what sheets do to the solid that the module draws, by the axis; in kg·length/time².
+    Force(usize),
 }
 
-impl Strain {
-    /// Number of hidden parameters that stand for it.
-    pub fn width(self) -> usize {
-        if self == Strain::Absent { 0 } else { 2 }
+impl Quantity {
+    /// All, in their order.
+    pub const ALL: [Quantity; 4] =
+        [Quantity::Strain, Quantity::Force(0), Quantity::Force(1), Quantity::Force(2)];
+
+    /// The name in rules.
+    pub fn name(self) -> &'static str {
+        match self {
+            Quantity::Strain => "strain",
+            Quantity::Force(0) => "force_x",
+            Quantity::Force(1) => "force_y",
+            Quantity::Force(_) => "force_z",
+        }
     }
+
+    /// True for a component of the force.
+    pub fn is_force(self) -> bool {
+        matches!(self, Quantity::Force(_))
+    }
+}
+
+/// A quantity in the hidden parameters of a kind: its value, and the slope with which it goes on until the surroundings give the
+/// next value. Kinds with the same base name and number of parameters have the same quantities.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Input {
+    /// The quantity.
+    pub quantity: Quantity,
+    /// Some rule of the kind reads it. If not, it is there because another kind that the same context patterns match reads it, and stays 0.
+    pub is_read: bool,
 }
 
 impl Kind {
@@ -86,12 +106,24 @@ impl Kind {
 
     /// Number of parameters that a string computes for a new module: all but the clocks.
     pub fn computed(&self) -> usize {
-        self.arity + self.strain.width()
+        self.arity + 2 * self.inputs.len()
     }
 
-    /// Number of the hidden parameter `strain`, behind which its slope stands, if a rule reads it.
-    pub fn strain_parameter(&self) -> Option<usize> {
-        (self.strain == Strain::Read).then_some(self.arity + self.clocks.len())
+    /// Numbers of the hidden parameters that hold the quantities that rules read. The slope of each stands behind it.
+    pub fn read_inputs(&self) -> impl Iterator<Item = (Quantity, usize)> + '_ {
+        let first = self.arity + self.clocks.len();
+        let read = self.inputs.iter().enumerate().filter(|(_, input)| input.is_read);
+        read.map(move |(i, input)| (input.quantity, first + 2 * i))
+    }
+
+    /// Number of the hidden parameter of a quantity, behind which its slope stands, if a rule reads it.
+    pub fn input_parameter(&self, quantity: Quantity) -> Option<usize> {
+        self.read_inputs().find(|(of, _)| *of == quantity).map(|(_, parameter)| parameter)
+    }
+
+    /// True if its rules read a component of the force.
+    pub fn reads_force(&self) -> bool {
+        self.read_inputs().any(|(quantity, _)| quantity.is_force())
     }
 
     /// Indices of its continuous and then its discrete rules.
@@ -202,7 +234,7 @@ impl Kinds {
             interpretation: None,
             skipped: class_of(name) != Class::Word,
             clocks: Vec::new(),
-            strain: Strain::Absent,
+            inputs: Vec::new(),
         });
         self.ids.insert((name.to_owned(), arity), id);
         id

@@ -56,8 +56,8 @@ pub use chance::{Clock, Distribution, Draw, NewClock, choose};
 pub use condition::{Condition, ConditionStep};
 pub use dlsys_expr::{Comparison, Fold, Sign, Truth};
 pub use kind::{
-    BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DETACH, DRAWN_WORDS, ELASTIC, GROUND, Kind, KindId,
-    Kinds, SOURCE, SURFACE_SIZES, Strain, base_of, class_of,
+    BUILT_IN_SURFACES, COMMAND_SURFACES, CUT, Class, DETACH, DRAWN_WORDS, ELASTIC, GROUND, Input, Kind,
+    KindId, Kinds, Quantity, SOURCE, SURFACE_SIZES, base_of, class_of,
 };
 pub use measure::Measure;
 pub use physics::{FieldCache, Flow, Gas, Primitive, Spectrum, Tissue, Units, Wind};
@@ -125,7 +125,17 @@ impl Model {
 impl Model {
     /// True if some rule reads `strain`, so that growth depends on how stems bend.
     pub fn reads_strain(&self) -> bool {
-        self.kinds.iter().any(|(_, kind)| kind.strain == Strain::Read)
+        self.kinds.iter().any(|(_, kind)| kind.input_parameter(Quantity::Strain).is_some())
+    }
+
+    /// True if some rule reads a component of the force on its solid, so that growth depends on what sheets do.
+    pub fn reads_force(&self) -> bool {
+        self.kinds.iter().any(|(_, kind)| kind.reads_force())
+    }
+
+    /// True if some rule reads anything that the surroundings give.
+    pub fn reads_inputs(&self) -> bool {
+        self.kinds.iter().any(|(_, kind)| kind.read_inputs().next().is_some())
     }
 
     /// The names of a kind's parameters: as in its first rule, or else their numbers.

@@ -3,7 +3,7 @@
 //! # Variables of a rule
 //!
 //! All expressions of a rule read the same variables, in this order: the parameters of the strict
-//! predecessor, then its hidden ones ([`Kind::clocks`](super::Kind::clocks), [`Strain`](super::Strain)); the same of the context modules, left to
+//! predecessor, then its hidden ones ([`Kind::clocks`](super::Kind::clocks), [`Input`](super::Input)); the same of the context modules, left to
 //! right as written; one value for each [`Aggregate`]; `t`; `age`; then one truth value for each [`Switch`], or the
 //! [`Draw`](super::Draw)s of a successor.
 

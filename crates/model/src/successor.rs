@@ -13,7 +13,7 @@ use dlsys_expr::{Program, Scratch, Value};
 pub struct Stretch {
     /// The modules and brackets in string order.
     pub kinds: Vec<KindId>,
-    /// The arguments of all modules in string order, with strains and without clocks. They read the variables of the rule, then the indices of
+    /// The arguments of all modules in string order, with inputs and without clocks. They read the variables of the rule, then the indices of
     /// the repetitions around them from the outermost on, then the draws.
     pub arguments: Program,
     /// The random numbers that the arguments read.

@@ -340,11 +340,17 @@ impl<'m> Nursery<'m> {
 
     pub(crate) fn start(&self, plant: &'m model::Plant, seed: u64) -> Result<Simulation<'m>, DrawError> {
         let settings = Settings { seed, ..self.settings };
-        if plant.model.reads_strain() {
+        if plant.model.reads_inputs() {
             // Each would grow in another way, at its own place.
-            let error = Diagnostic::error(format!("the rules of the plant `{}` read `strain`", plant.name))
-                .at(plant.span, "a plant in another model bends, but its rules cannot read that yet")
-                .help("draw it as a model of its own, or let its rules do without `strain`");
+            let (what, why) = match plant.model.reads_strain() {
+                true => ("`strain`", "a plant in another model bends, but its rules cannot read that yet"),
+                false => {
+                    ("the force of sheets", "sheets of the model around a plant do not push what it draws")
+                }
+            };
+            let error = Diagnostic::error(format!("the rules of the plant `{}` read {what}", plant.name))
+                .at(plant.span, why)
+                .help(format!("draw it as a model of its own, or let its rules do without {what}"));
             return Err(DrawError::Plant(Box::new(error)));
         }
         Simulation::new(&plant.model, settings).map_err(|error| fault(plant, 0.0, &error))

@@ -130,7 +130,7 @@ impl<'m> Replay<'m> {
     pub fn with_surroundings(
         model: &'m Model,
         settings: Settings,
-        surroundings: Box<dyn Surroundings>,
+        surroundings: Box<dyn Surroundings + 'm>,
     ) -> Result<Replay<'m>, Error> {
         let settings = Settings { log: true, ..settings };
         Replay::begin(Simulation::with_surroundings(model, settings, surroundings)?)

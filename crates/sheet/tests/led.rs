@@ -1,7 +1,8 @@
 //! Solids that are led: their equations of motion are integrated here, by formulas, from tick to tick, and the sheet has their mass only.
 
 use dlsys_sheet::{
-    Air, Error, Led, Matrix, Mesh, Place, Settings, Shape, Sheet, Solid, Solver, State, Still, Tissue, Vector,
+    Air, Drive, Error, Grip, Led, Matrix, Mesh, Place, Settings, Shape, Sheet, Solid, Solver, State, Still,
+    Tissue, Vector,
 };
 
 const MASS: f64 = 0.1;
@@ -74,15 +75,16 @@ fn follow(
     Ok(track)
 }
 
-/// A ball that falls onto a cloth in its middle does what a free ball does.
+/// A ball that falls onto a cloth beside its middle does what a free ball does that friction does not turn.
 #[test]
 fn a_led_ball_does_what_a_free_ball_does() -> Result<(), Error> {
     let (sheet, shape) = (cloth(true)?, Shape::ball(0.1)?);
-    let start = Place::at(Vector::new(0.5, 0.3, 0.5));
+    let start = Place::at(Vector::new(0.45, 0.3, 0.52));
     let free = |tolerance: f64| -> Result<Vec<Vector>, Error> {
         let mut state = State::at_rest(&sheet).with(vec![start]);
         let mut solver = Solver::new(settings(tolerance));
-        let solids = [Solid::free_ball(&shape, MASS)];
+        let drive = Drive::Free { mass: MASS, inertia: [1e9; 3] };
+        let solids = [Solid { shape: &shape, drive, grip: Grip::default() }];
         (0..40)
             .map(|tick| {
                 let span = tick as f64 * TICK..(tick + 1) as f64 * TICK;
@@ -91,19 +93,19 @@ fn a_led_ball_does_what_a_free_ball_does() -> Result<(), Error> {
             })
             .collect()
     };
-    let exact = free(1e-5)?;
-    let apart = |other: &[Vector]| exact.iter().zip(other).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
-    for (tolerance, bound) in [(1e-3, 4e-3), (1e-4, 1e-3)] {
-        let light = Matrix::from_diagonal_element(1.0 / MASS);
-        let led: Vec<Vector> = follow((&sheet, &shape), (start, GRAVITY), &light, (tolerance, 40))?
-            .iter()
-            .map(|(place, _)| place.position)
-            .collect();
-        let (led, free) = (apart(&led), apart(&free(tolerance)?));
-        assert!(led < bound, "{led:e}, and a free one {free:e}");
+    let exact = free(1e-6)?;
+    let light = Matrix::from_diagonal_element(1.0 / MASS);
+    let mut errors = Vec::new();
+    for tolerance in [1e-3, 1e-4, 1e-5] {
+        let led = follow((&sheet, &shape), (start, GRAVITY), &light, (tolerance, 40))?;
+        let apart = exact.iter().zip(&led).map(|(a, (b, _))| (a - b.position).norm());
+        errors.push(apart.fold(0.0, f64::max));
     }
+    let allowed = [1e-2, 2e-3, 2e-4];
+    assert!(errors.iter().zip(allowed).all(|(error, most)| *error < most), "{errors:?}");
     let lowest = exact.iter().map(|place| place.y).fold(f64::INFINITY, f64::min);
-    assert!(lowest < 0.0, "it reaches the cloth: {lowest}");
+    let aside = exact.iter().map(|place| (place.x - 0.45).abs()).fold(0.0, f64::max);
+    assert!(lowest < 0.0 && aside > 5e-4, "it reaches the cloth, and is pushed aside: {lowest} {aside}");
     Ok(())
 }
 

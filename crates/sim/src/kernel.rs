@@ -51,7 +51,7 @@ pub struct Simulation<'m> {
     pub(super) frames: FrameCache,
     pub(super) scratch: Scratch,
     /// None for a model that reads nothing of its surroundings.
-    pub(super) surroundings: Option<Box<Link>>,
+    pub(super) surroundings: Option<Box<Link<'m>>>,
     budget: Budget,
     progress: Progress,
     /// The error with which the simulation has ended.
@@ -75,7 +75,7 @@ const MAX_STANDING: usize = 1000;
 
 impl<'m> Simulation<'m> {
     /// Makes the initial string at t = 0 and lets everything happen that happens there. Without surroundings
-    /// ([`Simulation::with_surroundings`]) every `strain` is 0.
+    /// ([`Simulation::with_surroundings`]) every `strain` and every force is 0.
     ///
     /// # Errors
     /// If the initial string has no parameters, or what happens at t = 0 fails.

@@ -92,5 +92,5 @@ pub use kernel::Simulation;
 pub use log::{Event, ModuleState, Transition};
 pub use observe::inspect::{InspectedModule, Inspection};
 pub use settings::{BendMethod, BendSettings, Scheduler, Settings, Stats};
-pub use surroundings::{Failure, Inputs, Surroundings};
+pub use surroundings::{Failure, Force, Inputs, Surroundings};
 pub use world::{brief, describe};

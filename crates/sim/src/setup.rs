@@ -29,8 +29,8 @@ pub struct Setup<'m> {
     /// No rule has a context, is algebraic or discrete, and no transition is recorded: a production of a lazy module concerns
     /// no other module.
     pub plain: bool,
-    /// Some rule reads `strain`.
-    pub reads_strain: bool,
+    /// Some rule reads what the surroundings give.
+    pub reads_inputs: bool,
     /// Some parameters are algebraic.
     pub is_algebraic: bool,
     /// Some rates may have pulses.
@@ -61,7 +61,7 @@ impl<'m> Setup<'m> {
             hands_on,
             gathers,
             plain: !hands_on && !gathers && !is_algebraic && !is_discrete && !settings.transitions,
-            reads_strain: model.reads_strain(),
+            reads_inputs: model.reads_inputs(),
             is_algebraic,
             has_pulses: solves().any(|solve| solve.has_pulses),
         }

@@ -1,8 +1,8 @@
 //! Surroundings: what acts on the modules from outside, on a grid of time of its own, as the bending of stems does.
 //!
-//! At each tick the surroundings get the string and give, for each module that reads `strain`, the strain at the next tick. From
-//! tick to tick a strain is linear in time, so it is continuous, and to all stages it is a parameter that moves at a constant
-//! rate: the tick changes the slope, and the modules concerned begin new trajectories, as they do when a neighbour changes.
+//! At each tick the surroundings get the string and give, for each module that reads `strain` or a force, the values up to the next tick. From
+//! tick to tick they are linear in time: a strain from its present value on, so it is continuous; a force from a new one. To all stages each is a parameter
+//! that moves at a constant rate: the tick changes the slope, and the modules concerned begin new trajectories, as they do when a neighbour changes.
 //!
 //! A tick is an entry of the schedule, after all others of its instant. So neither frames nor threads can change its time, the
 //! string that it sees, or anything that follows from it.
@@ -15,8 +15,9 @@ use crate::trajectory::Trajectory;
 use crate::world::{World, describe, site_of_axiom};
 use crate::{Settings, brief};
 use dlsys_diagnostic::Span;
-use dlsys_model::Model;
+use dlsys_model::{Model, Quantity};
 use dlsys_tree::{Module, ModuleId, ModuleString, SimTime, Version, Visit};
+use smallvec::SmallVec;
 
 /// What acts on the modules of a simulation from outside, at the ticks of a grid of time.
 ///
@@ -34,7 +35,9 @@ pub trait Surroundings: Send + Sync {
     fn tick(&mut self, string: &ModuleString, inputs: &mut Inputs) -> Result<(), Failure>;
 
     /// A copy that goes on as the original does, to the same bits.
-    fn boxed_clone(&self) -> Box<dyn Surroundings>;
+    fn boxed_clone<'a>(&self) -> Box<dyn Surroundings + 'a>
+    where
+        Self: 'a;
 
     /// Bytes that a copy takes, about.
     fn size(&self) -> usize;
@@ -50,11 +53,16 @@ pub trait Surroundings: Send + Sync {
 pub struct Inputs {
     readers: Vec<usize>,
     strain: Vec<f64>,
+    forces: Vec<Force>,
     productions: Vec<Event>,
 }
 
+/// A force from a tick to the next one, in units of the model: kg·length/time². For each axis its value after the tick and that before the next one; in
+/// between it is linear in time.
+pub type Force = [[f64; 2]; 3];
+
 impl Inputs {
-    /// The indices in the string of the modules that read `strain`, in ascending order.
+    /// The indices in the string of the modules that read what the surroundings give, in ascending order.
     pub fn readers(&self) -> &[usize] {
         &self.readers
     }
@@ -65,9 +73,21 @@ impl Inputs {
         &mut self.strain
     }
 
+    /// The force on the solid of each reader, in the order of [`Inputs::readers`]. They are 0 at first.
+    pub fn forces_mut(&mut self) -> &mut [Force] {
+        &mut self.forces
+    }
+
     /// The productions since the last tick, or since t = 0, in the order of time.
     pub fn productions(&self) -> &[Event] {
         &self.productions
+    }
+
+    /// Sets the force of each reader to a function of the module.
+    pub fn set_forces(&mut self, string: &ModuleString, mut force: impl FnMut(Module<'_>) -> Force) {
+        for (value, &index) in self.forces.iter_mut().zip(&self.readers) {
+            *value = force(string.get(index));
+        }
     }
 
     /// Sets the strain of each reader to a function of the module.
@@ -113,22 +133,49 @@ impl Failure {
     }
 }
 
-/// The surroundings of a simulation, with the memory for the string that they get.
-pub(super) struct Link {
-    source: Box<dyn Surroundings>,
+/// The modules that read what the surroundings give, and what they are given.
+#[derive(Default)]
+struct Readers {
     string: ModuleString,
     inputs: Inputs,
-    /// The modules that read `strain`, in string order, in the structure of some version.
-    readers: Vec<ModuleId>,
+    /// In string order, in the structure of some version.
+    modules: Vec<ModuleId>,
     version: Option<Version>,
+}
+
+impl Readers {
+    /// Finds the modules, if the structure has changed.
+    fn find(&mut self, model: &Model, world: &World) {
+        if self.version.is_none() || self.version != self.string.version() {
+            self.version = self.string.version();
+            self.modules.clear();
+            self.inputs.readers.clear();
+            for (index, visit) in world.tree.walk().enumerate() {
+                let Visit::Module(id) = visit else { continue };
+                if model.kinds.get(world.tree.kind(id)).read_inputs().next().is_some() {
+                    self.modules.push(id);
+                    self.inputs.readers.push(index);
+                }
+            }
+        }
+        self.inputs.strain.clear();
+        self.inputs.strain.resize(self.modules.len(), 0.0);
+        self.inputs.forces.clear();
+        self.inputs.forces.resize(self.modules.len(), Force::default());
+    }
+}
+
+/// The surroundings of a simulation, with the memory for the string that they get.
+pub(super) struct Link<'m> {
+    source: Box<dyn Surroundings + 'm>,
+    readers: Readers,
     /// How often a module has begun new trajectories because of a tick.
     restarts: u64,
 }
 
-impl Link {
-    fn new(source: Box<dyn Surroundings>) -> Link {
-        let (string, inputs, readers) = Default::default();
-        Link { source, string, inputs, readers, version: None, restarts: 0 }
+impl<'m> Link<'m> {
+    fn new(source: Box<dyn Surroundings + 'm>) -> Link<'m> {
+        Link { source, readers: Readers::default(), restarts: 0 }
     }
 
     /// Bytes that a copy takes, about.
@@ -142,28 +189,11 @@ impl Link {
         const RESTART: u64 = 10;
         self.source.work() + RESTART * self.restarts
     }
-
-    /// Finds the modules that read `strain`, if the structure has changed.
-    fn find_readers(&mut self, model: &Model, world: &World) {
-        if self.version.is_some() && self.version == self.string.version() {
-            return;
-        }
-        self.version = self.string.version();
-        self.readers.clear();
-        self.inputs.readers.clear();
-        for (index, visit) in world.tree.walk().enumerate() {
-            let Visit::Module(id) = visit else { continue };
-            if model.kinds.get(world.tree.kind(id)).strain_parameter().is_some() {
-                self.readers.push(id);
-                self.inputs.readers.push(index);
-            }
-        }
-    }
 }
 
 /// The string of a copy is empty: it is formed anew at the next tick.
-impl Clone for Link {
-    fn clone(&self) -> Link {
+impl<'m> Clone for Link<'m> {
+    fn clone(&self) -> Link<'m> {
         Link { restarts: self.restarts, ..Link::new(self.source.boxed_clone()) }
     }
 }
@@ -176,16 +206,35 @@ impl<'m> Simulation<'m> {
     pub fn with_surroundings(
         model: &'m Model,
         settings: Settings,
-        surroundings: Box<dyn Surroundings>,
+        surroundings: Box<dyn Surroundings + 'm>,
     ) -> Result<Simulation<'m>, Error> {
         let mut simulation = Simulation::new(model, settings)?;
-        if model.reads_strain() {
+        if model.reads_inputs() {
             let link = Link::new(surroundings);
             simulation.schedule_tick(&link, None)?;
             simulation.surroundings = Some(Box::new(link));
             simulation.log.descent = Some(Vec::new());
         }
         Ok(simulation)
+    }
+
+    /// Gives values to all modules that read what surroundings give, at a time up to which the simulation has [passed](Simulation::pass), as a tick does: they
+    /// hold for a `duration`, and go on with their slopes after it. For simulations without surroundings.
+    ///
+    /// # Errors
+    /// A value that is not finite, and those of what happens then: conditions may begin to hold.
+    pub fn give(
+        &mut self,
+        (time, duration): (f64, f64),
+        give: impl FnOnce(&ModuleString, &mut Inputs),
+    ) -> Result<(), Error> {
+        self.guarded(|simulation| {
+            let mut readers = Readers::default();
+            let now = simulation.begin_tick(SimTime::new(time));
+            simulation.show_to(&mut readers, now)?;
+            give(&readers.string, &mut readers.inputs);
+            simulation.hand(&readers, duration, now).map(|_| ())
+        })
     }
 
     /// Puts the next tick into the schedule; returns the time until then from a tick now. `before` is the last one.
@@ -201,7 +250,7 @@ impl<'m> Simulation<'m> {
         };
         if !is_later {
             let why = format!("their next tick would be at t = {}, which is not later", brief(next, 12));
-            return Err(self.failure(Failure::new(why), link));
+            return Err(self.failure(Failure::new(why), &link.readers));
         }
         self.schedule.schedule(Owner::Tick, SimTime::new(next));
         Ok(ahead)
@@ -216,64 +265,109 @@ impl<'m> Simulation<'m> {
     }
 
     fn tick(&mut self, at: SimTime, link: &mut Link) -> Result<(), Error> {
-        // An event within the resolution of time of the tick may have taken place a little after it.
+        let now = self.begin_tick(at);
+        self.show_to(&mut link.readers, now)?;
+        let Link { source, readers, .. } = link;
+        let productions = &mut readers.inputs.productions;
+        productions.clear();
+        productions.append(self.log.descent.get_or_insert_default());
+        let given = source.tick(&readers.string, &mut readers.inputs);
+        given.map_err(|failure| self.failure(failure, readers))?;
+        let duration = self.schedule_tick(link, Some(now))?;
+        link.restarts += self.hand(&link.readers, duration, now)?;
+        Ok(())
+    }
+
+    /// The instant of a tick: an event within the resolution of time of it may have taken place a little after it.
+    fn begin_tick(&mut self, at: SimTime) -> SimTime {
         if at.since(self.instant.at) > 0.0 {
             self.instant.at = at;
         }
-        let now = self.instant.at;
+        self.instant.at
+    }
+
+    /// Writes the string for surroundings, and finds the modules that read what they give.
+    fn show_to(&mut self, readers: &mut Readers, now: SimTime) -> Result<(), Error> {
         self.flow_stage().show_coupled(now);
-        self.observe(now.to_f64(), now, &mut link.string)?;
-        link.find_readers(self.setup.model, &self.world);
-        link.inputs.strain.clear();
-        link.inputs.strain.resize(link.readers.len(), 0.0);
-        let productions = &mut link.inputs.productions;
-        productions.clear();
-        productions.append(self.log.descent.get_or_insert_default());
-        let Link { source, string, inputs, .. } = link;
-        source.tick(string, inputs).map_err(|failure| self.failure(failure, link))?;
-        let duration = self.schedule_tick(link, Some(now))?;
-        let before = link.restarts;
-        for i in 0..link.readers.len() {
-            let (index, strain) = (link.inputs.readers[i], link.inputs.strain[i]);
-            match self.bend(link.readers[i], strain, duration, now) {
-                Some(bent) => link.restarts += u64::from(bent),
-                None => {
-                    let why = format!("the strain at the next tick is {}", brief(strain, 6));
-                    return Err(self.failure(Failure::new(why).of(index), link));
+        self.observe(now.to_f64(), now, &mut readers.string)?;
+        readers.find(self.setup.model, &self.world);
+        Ok(())
+    }
+
+    /// Lets modules go on with what they are given for a duration; returns how many of them begin new trajectories.
+    fn hand(&mut self, readers: &Readers, duration: f64, now: SimTime) -> Result<u64, Error> {
+        let mut restarts = 0;
+        for (i, &id) in readers.modules.iter().enumerate() {
+            let (strain, force) = (readers.inputs.strain[i], readers.inputs.forces[i]);
+            match self.take_inputs(id, (strain, force), duration, now) {
+                Ok(restarted) => restarts += u64::from(restarted),
+                Err(quantity) => {
+                    let why = match quantity {
+                        Quantity::Strain => format!("the strain at the next tick is {}", brief(strain, 6)),
+                        Quantity::Force(axis) => {
+                            let [from, to] = force[axis].map(|value| brief(value, 6));
+                            format!("`{}` goes from {from} to {to}", quantity.name())
+                        }
+                    };
+                    let failure = Failure::new(why).of(readers.inputs.readers[i]);
+                    return Err(self.failure(failure, readers));
                 }
             }
         }
-        if link.restarts > before { self.event_stage().iterate() } else { Ok(()) }
+        if restarts > 0 {
+            self.event_stage().iterate()?;
+        }
+        Ok(restarts)
     }
 
-    /// Gives a module the slope with which its strain reaches a value after a time; true if that is another slope than before, None if
-    /// it is no number.
-    fn bend(&mut self, id: ModuleId, strain: f64, duration: f64, now: SimTime) -> Option<bool> {
-        let kind = self.world.tree.kind(id);
-        let parameter = self.setup.model.kinds.get(kind).strain_parameter()?;
-        let place = self.world.tree.places(id).start + parameter + 1;
-        let slope = (strain - self.world.value(id, parameter, now)) / duration;
-        if !slope.is_finite() || !strain.is_finite() {
-            return None;
+    /// Gives a module the values and slopes with which its quantities go on; true if any is another than before, and a quantity if that is no number.
+    fn take_inputs(
+        &mut self,
+        id: ModuleId,
+        (strain, force): (f64, Force),
+        duration: f64,
+        now: SimTime,
+    ) -> Result<bool, Quantity> {
+        let model = self.setup.model;
+        let start = self.world.tree.places(id).start;
+        let mut given: SmallVec<[(usize, f64); 8]> = SmallVec::new();
+        for (quantity, parameter) in model.kinds.get(self.world.tree.kind(id)).read_inputs() {
+            let present = self.world.value(id, parameter, now);
+            let [value, end] = match quantity {
+                Quantity::Strain => [present, strain],
+                Quantity::Force(axis) => force[axis],
+            };
+            let slope = if value == end { 0.0 } else { (end - value) / duration };
+            if !slope.is_finite() || !end.is_finite() {
+                return Err(quantity);
+            }
+            if value != present {
+                given.push((parameter, value));
+            }
+            if slope != self.world.tree.values()[start + parameter + 1] {
+                given.push((parameter + 1, slope));
+            }
         }
-        if slope == self.world.tree.values()[place] {
-            return Some(false);
+        if given.is_empty() {
+            return Ok(false);
         }
-        // The trajectory of the strain up to now has the slope before; it ends where the next one begins.
-        self.world.tree.set_value(place, slope);
+        // The trajectories up to now have the slopes before; they end where the next ones begin.
         let state = self.world.state(id);
         match state.and_then(|state| Some((state.rule?, state.context.clone()))) {
-            Some((rule, context)) => self.event_stage().take_up(id, rule, &context),
-            None => self.world.bend_at_rest(self.setup.model, id, now),
+            Some((rule, context)) => self.event_stage().take_up_with(id, rule, &context, &given),
+            None => {
+                self.world.rebase_with(id, now, &given);
+                self.world.let_inputs_go_on(model, id, now);
+            }
         }
-        Some(true)
+        Ok(true)
     }
 
     /// The error of surroundings that cannot go on.
-    fn failure(&self, failure: Failure, link: &Link) -> Error {
+    fn failure(&self, failure: Failure, readers: &Readers) -> Error {
         let now = self.instant.at;
-        let modules = |index: usize| link.string.iter().enumerate().nth(index);
-        let first = || link.string.iter().enumerate().find(|(_, module)| !module.kind.is_bracket());
+        let modules = |index: usize| readers.string.iter().enumerate().nth(index);
+        let first = || readers.string.iter().enumerate().find(|(_, module)| !module.kind.is_bracket());
         let mut site = site_of_axiom(now.to_f64());
         if let Some((index, module)) = failure.module.and_then(modules).or_else(first)
             && let Some(Visit::Module(id)) = self.world.tree.walk().nth(index)
@@ -288,12 +382,23 @@ impl<'m> Simulation<'m> {
 }
 
 impl World {
-    /// Begins the trajectory of the strain of a module that no rule with equations applies to, so that it goes on there, too.
-    pub fn bend_at_rest(&mut self, model: &Model, id: ModuleId, now: SimTime) {
-        let Some(parameter) = model.kinds.get(self.tree.kind(id)).strain_parameter() else { return };
+    /// As [`World::rebase`], with values that are given.
+    pub fn rebase_with(&mut self, id: ModuleId, now: SimTime, given: &[(usize, f64)]) {
         self.rebase(id, now);
-        let values = self.tree.parameters(id);
-        let (width, slope) = (values.len(), values[parameter + 1]);
+        let start = self.tree.places(id).start;
+        for (parameter, value) in given {
+            self.tree.set_value(start + parameter, *value);
+        }
+    }
+
+    /// Begins the trajectories of what the surroundings give to a module that no rule with equations applies to, so that it goes on there, too.
+    pub fn let_inputs_go_on(&mut self, model: &Model, id: ModuleId, now: SimTime) {
+        let kind = model.kinds.get(self.tree.kind(id));
+        if kind.read_inputs().next().is_none() {
+            return;
+        }
+        self.rebase(id, now);
+        let width = self.tree.parameters(id).len();
         if self.state(id).is_none() {
             self.new_state(id);
         }
@@ -301,6 +406,10 @@ impl World {
         state.since = now;
         state.trajectories.clear();
         state.trajectories.resize(width, Trajectory::Rest);
-        state.trajectories[parameter] = Trajectory::Polynomial([slope, 0.0, 0.0, 0.0]);
+        for (_, parameter) in kind.read_inputs() {
+            let slope = self.tree.parameters(id)[parameter + 1];
+            let Some(state) = self.state_mut(id) else { return };
+            state.trajectories[parameter] = Trajectory::Polynomial([slope, 0.0, 0.0, 0.0]);
+        }
     }
 }

@@ -7,7 +7,7 @@ use dlsys_sheet as sheet;
 use dlsys_sim::brief;
 use dlsys_sway as sway;
 
-use crate::error::{FailedStem, FallingPart};
+use crate::error::{CouplingFault, FailedStem, FallingPart};
 
 impl FailedStem {
     /// Adds the places in the text, and the measures.
@@ -124,6 +124,34 @@ pub(crate) fn on_ground(error: &ground::Error) -> (&'static str, &'static str) {
 pub(crate) fn falling(error: &fall::Error, part: &FallingPart, time: f64) -> String {
     let FallingPart { kind, lineage, .. } = part;
     format!("what `{kind}` (module {lineage}) lets go cannot be followed at t = {}: {error}", brief(time, 8))
+}
+
+/// The failure of a coupling in words.
+pub(crate) fn coupling(fault: &CouplingFault) -> String {
+    match fault {
+        CouplingFault::Apart { by, allowed, step } => format!(
+            "under the force of the sheets its equations lead it {} m away from where they push it, even in {} s; {} m is allowed",
+            brief(*by, 2),
+            brief(*step, 2),
+            brief(*allowed, 2)
+        ),
+        CouplingFault::NoMass => {
+            "its equations do not answer a force as a mass does, along it or along the axes whose forces they read".to_owned()
+        }
+    }
+}
+
+/// Remedies for it.
+pub(crate) fn of_coupling(fault: CouplingFault, diagnostic: Diagnostic) -> Diagnostic {
+    let newton = "let a force be a part of an acceleration, as in `solve dy/dt = v, dv/dt = -9.81 + force_y/0.68`: a velocity is the rate of a place, and a force over a mass that of a velocity";
+    match fault {
+        CouplingFault::Apart { .. } => {
+            diagnostic.help(newton).help("`--bend-tolerance 0.01` allows larger errors than the default 0.001")
+        }
+        CouplingFault::NoMass => diagnostic
+            .help(newton)
+            .help("what a force moves along another axis, too, reads the force along that: both `force_x` and `force_y`"),
+    }
 }
 
 /// Remedies for a sheet that cannot be followed.

@@ -16,6 +16,7 @@ use crate::course::LOOK_BACK;
 use crate::descent::Descent;
 use crate::motion::Passive;
 use crate::place::Place;
+use crate::pushed;
 use crate::weather::{Sampler, Weather};
 use crate::{CLOCK, Error};
 
@@ -24,6 +25,9 @@ use crate::{CLOCK, Error};
 /// # Errors
 /// As of [`Simulation::new`], and if the wind has no meaning.
 pub fn start<'m>(model: &'m Model, settings: Settings, place: Place) -> Result<Simulation<'m>, sim::Error> {
+    if model.reads_force() {
+        return pushed::start(model, settings, place);
+    }
     if !model.reads_strain() || model.scenery.tissues.is_empty() {
         return Simulation::new(model, settings);
     }
@@ -126,7 +130,10 @@ impl Surroundings for Coupled {
         Ok(())
     }
 
-    fn boxed_clone(&self) -> Box<dyn Surroundings> {
+    fn boxed_clone<'a>(&self) -> Box<dyn Surroundings + 'a>
+    where
+        Self: 'a,
+    {
         Box::new(self.clone())
     }
 
@@ -142,7 +149,7 @@ impl Surroundings for Coupled {
 }
 
 /// An error at a string as the kernel reports it.
-fn failure(error: &Error, string: &ModuleString) -> Failure {
+pub(crate) fn failure(error: &Error, string: &ModuleString) -> Failure {
     let diagnostic = error.diagnostic();
     let mut failure = Failure::new(diagnostic.message.clone());
     if let Error::Bending { stem: Some(stem), .. } = error
@@ -152,6 +159,11 @@ fn failure(error: &Error, string: &ModuleString) -> Failure {
     }
     if let Some((span, _)) = diagnostic.labels.first() {
         failure = failure.at(*span);
+    }
+    if let Error::Coupling { lineage, .. } = error
+        && let Some(index) = string.iter().position(|module| module.lineage == *lineage)
+    {
+        failure = failure.of(index);
     }
     if let Some(help) = diagnostic.help.first() {
         failure = failure.help(help.clone());

@@ -50,6 +50,23 @@ pub struct FallingPart {
     pub size: Option<f64>,
 }
 
+/// Why a solid and the sheets that push it cannot be followed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum CouplingFault {
+    /// What its equations do with the force is not what the force does to a mass, in the shortest part of a tick.
+    Apart {
+        /// How far the ways are apart, in m.
+        by: f64,
+        /// The largest distance that is allowed, in m.
+        allowed: f64,
+        /// The length of the part, in s.
+        step: f64,
+    },
+    /// The acceleration by a force is not that of a mass: it points against the force, or depends on forces along other axes in one direction only.
+    NoMass,
+}
+
 /// Why the surroundings cannot be computed.
 #[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -178,6 +195,20 @@ pub enum Error {
         /// The time in units of the model.
         time: f64,
         /// The place in the text that places it, or the declaration.
+        span: Span,
+    },
+    /// Equations of motion that do not go with what the force of a sheet does to a solid.
+    #[error("`{kind}` (module {lineage}) and the sheets cannot be followed both ways at t = {}: {}", brief(*.time, 8), advice::coupling(.fault))]
+    Coupling {
+        /// Name of the kind of the module.
+        kind: String,
+        /// The module itself.
+        lineage: Lineage,
+        /// The time in units of the model.
+        time: f64,
+        /// The reason.
+        fault: CouplingFault,
+        /// The place in the text that says how it is drawn, or its name in the declaration of solids.
         span: Span,
     },
     /// Too many points of sheets.
@@ -317,6 +348,9 @@ impl Error {
             Error::TooManySheets { span, .. } => Diagnostic::error(self.to_string())
                 .at(*span, "this one is too many")
                 .help("place fewer sheets, or give them coarser meshes: 1,000 points make a smooth flag"),
+            Error::Coupling { fault, span, .. } => {
+                advice::of_coupling(*fault, Diagnostic::error(self.to_string()).at(*span, "what is drawn here"))
+            }
             Error::Gas { name, error: gas::Error::Blobs { most, .. }, time, span } => Diagnostic::error(format!(
                 "the gas `{name}` has more than {most} blobs at t = {}",
                 brief(*time, 8)

@@ -4,10 +4,12 @@
 //! growth ──string at instants of the tick──▶ turtle ──births, solids──▶ solver (sheet, wind) ──▶ states at its steps
 //! ```
 //!
+//! Where rules read the forces on solids, a tick is gone through in parts, both ways: `leading.rs`.
+//!
 //! A sheet begins at the birth of its module, at rest in the shape of its file, where the turtle stands then. It hangs on the descent of its
 //! module: a production that places it again changes nothing.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -21,6 +23,8 @@ use dlsys_sim::{Passed, Simulation};
 use dlsys_tree::ModuleString;
 
 use crate::descent::Descent;
+use crate::leading::Leading;
+use crate::line::{Exerted, Line};
 use crate::paths::{INSTANTS, Path, Watch};
 use crate::place::Place;
 use crate::weather::{Gusts, Sampler};
@@ -36,16 +40,18 @@ pub(crate) struct Hung {
     pub(crate) origin: Origin,
     /// Its index among those that the model declares.
     pub(crate) sheet: usize,
-    made: Arc<Sheet>,
+    pub(crate) made: Arc<Sheet>,
     /// When it begins, in s.
-    begin: f64,
+    pub(crate) begin: f64,
 }
 
-/// A sheet from one tick to the next: its states at the ends of steps, and where it begins.
+/// A sheet through a tick or a part of it: its states at the ends of steps, and where it begins.
 #[derive(Clone, Debug)]
 pub(crate) struct Track {
     pub(crate) hung: Arc<Hung>,
-    steps: Vec<(f64, State)>,
+    pub(crate) steps: Vec<(f64, State)>,
+    /// What it does to the solids that sheets push, by their modules.
+    pub(crate) forces: Vec<(u64, Line)>,
 }
 
 impl Track {
@@ -69,24 +75,49 @@ impl Track {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tick {
     pub(crate) number: u64,
-    pub(crate) tracks: Vec<Track>,
-    pub(crate) descent: Descent,
+    /// One, or several where rules read forces.
+    pub(crate) parts: Vec<Part>,
     /// Growth fails before the next tick; solids stand still until then.
     pub(crate) failed: Option<Error>,
 }
 
+/// What happens to sheets from one time to another, both in s.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Part {
+    pub(crate) end: f64,
+    pub(crate) tracks: Vec<Track>,
+    pub(crate) descent: Descent,
+    /// What sheets do to solids whose rules read it, by the module at the beginning.
+    pub(crate) forces: BTreeMap<u64, Line>,
+}
+
 impl Tick {
-    /// Number of points that are kept, and one for itself.
-    pub(crate) fn size(&self) -> usize {
-        1 + self.tracks.iter().map(Track::points).sum::<usize>()
+    /// The part within which a time in s lies.
+    pub(crate) fn part(&self, seconds: f64) -> Option<&Part> {
+        self.parts.iter().find(|part| part.end >= seconds).or(self.parts.last())
     }
+
+    /// Number of points that are kept, and one for itself and for each part.
+    pub(crate) fn size(&self) -> usize {
+        let tracks = self.parts.iter().flat_map(|part| &part.tracks);
+        1 + self.parts.len() + tracks.map(Track::points).sum::<usize>()
+    }
+}
+
+/// A sheet where a part of a tick begins.
+#[derive(Clone)]
+pub(crate) struct Hanger {
+    pub(crate) hung: Arc<Hung>,
+    pub(crate) state: State,
+    /// The means of those of its track before.
+    pub(crate) forces: Vec<(u64, Line)>,
 }
 
 /// What growth does from one tick to the next.
 #[derive(Clone, Default)]
 pub(crate) struct View {
     pub(crate) paths: Vec<Path>,
-    births: Vec<Arc<Hung>>,
+    pub(crate) births: Vec<Arc<Hung>>,
     pub(crate) descent: Descent,
     /// The sheets of the string at the next tick, if they may have changed.
     next: Option<Vec<SheetPlace>>,
@@ -96,19 +127,21 @@ pub(crate) struct View {
 /// The sheets of a model at a tick, and its growth up to there.
 #[derive(Clone)]
 pub(crate) struct Hanging<'m> {
-    model: &'m Model,
+    pub(crate) model: &'m Model,
     pub(crate) place: Place,
     pub(crate) growth: Simulation<'m>,
     /// The number of the present tick.
     pub(crate) number: u64,
     /// In the order of their births.
-    hung: Vec<(Arc<Hung>, State)>,
+    pub(crate) hung: Vec<Hanger>,
+    /// Where rules read the forces on solids.
+    leading: Option<Leading>,
     /// The kinds that place sheets.
     drapers: Arc<[bool]>,
     /// A drawing that places a sheet may do so at one time and not at another.
     chooses: bool,
     wind: Arc<Sampler<'static>>,
-    solver: Solver,
+    pub(crate) solver: Solver,
     scene: Scene,
 }
 
@@ -126,7 +159,8 @@ impl<'m> Hanging<'m> {
         let tolerance = tolerance.clamp(1e-12, 0.1);
         let solver = Solver::new(Settings { tolerance, longest: TICK, ..Settings::default() });
         let (hung, scene) = (Vec::new(), turtle::blank(model));
-        Hanging { model, place, growth, number: 0, hung, drapers, chooses, wind, solver, scene }
+        let leading = model.reads_force().then(Leading::default);
+        Hanging { model, place, growth, number: 0, hung, leading, drapers, chooses, wind, solver, scene }
     }
 
     /// Sets when the solver gives up.
@@ -141,7 +175,7 @@ impl<'m> Hanging<'m> {
 
     /// Points of all sheets at the tick.
     pub(crate) fn points(&self) -> usize {
-        self.hung.iter().map(|(hung, _)| hung.made.len()).sum()
+        self.hung.iter().map(|hanger| hanger.hung.made.len()).sum()
     }
 
     /// Seconds at the beginning of the present tick.
@@ -154,24 +188,50 @@ impl<'m> Hanging<'m> {
     /// # Errors
     /// A drawing fails, or a sheet cannot be followed.
     pub(crate) fn tick(&mut self) -> Result<Tick, Error> {
-        let mut growth = self.growth.clone();
-        let view = self.look(&mut growth)?;
-        let tracks = self.solve(&view)?;
-        self.growth = growth;
-        self.end(view, tracks)
+        let mut tick = Tick { number: self.number, ..Tick::default() };
+        let (mut begin, end) = (self.begin(), self.begin() + TICK);
+        while begin < end && tick.failed.is_none() {
+            let (part, failed) = match self.leading.take() {
+                None => self.one_way((begin, end - begin))?,
+                Some(mut leading) => {
+                    let gone = self.both_ways(begin, &mut leading);
+                    self.leading = Some(leading);
+                    gone?
+                }
+            };
+            begin = part.end;
+            tick.parts.push(part);
+            tick.failed = failed;
+        }
+        self.number += 1;
+        Ok(tick)
     }
 
-    /// Lets growth go on to the next tick, and draws what sheets need on the way. Growth may fail there, after a time that is asked for.
+    /// Goes on through a span (beginning and length, in s) in which nothing pushes solids.
+    pub(crate) fn one_way(&mut self, span: (f64, f64)) -> Result<(Part, Option<Error>), Error> {
+        let mut growth = self.growth.clone();
+        let view = self.look(&mut growth, span, None)?;
+        let tracks = self.solve(&view, span)?;
+        Ok(self.end(span, (view, growth), tracks, BTreeMap::new()))
+    }
+
+    /// Lets growth go on through a span (beginning and length, in s), with these forces on solids, and draws what sheets need on the way. Growth may fail there,
+    /// after a time that is asked for.
     ///
     /// # Errors
     /// A drawing fails, or a sheet cannot be made.
-    pub(crate) fn look(&mut self, growth: &mut Simulation<'m>) -> Result<View, Error> {
+    pub(crate) fn look(
+        &mut self,
+        growth: &mut Simulation<'m>,
+        (begin, length): (f64, f64),
+        exerted: Option<&Exerted>,
+    ) -> Result<View, Error> {
         let mut view = View::default();
         let mut watch = Watch::default();
         let (mut string, mut scene) = (ModuleString::default(), std::mem::take(&mut self.scene));
         let mut seen = false;
         for (instant, part) in INSTANTS.into_iter().enumerate() {
-            let time = self.place.time_at(self.begin() + TICK * part);
+            let time = self.place.time_at(begin + length * part);
             match self.pass(growth, time, (&mut string, &mut scene), &mut view) {
                 Ok(changed) => seen |= changed,
                 Err(error @ Error::Growth(_)) => {
@@ -182,12 +242,18 @@ impl<'m> Hanging<'m> {
             }
             let around = (self.model, &self.place);
             watch.note((instant, &string), around, &view.descent, &mut scene)?;
+            if let Some(exerted) = exerted.filter(|_| instant == 0)
+                && let Err(error) = exerted.act(growth, (begin, length), &self.place)
+            {
+                view.failed = Some(error);
+                break;
+            }
         }
-        view.paths = watch.paths(self.begin(), TICK);
+        view.paths = watch.paths(begin, length);
         if view.failed.is_none() && (seen || self.chooses) {
             scene.clear();
             turtle::draw(self.model, &string, &mut scene)?;
-            self.find_new((&scene, self.begin() + TICK), &mut view)?;
+            self.find_new((&scene, begin + length), &mut view)?;
             view.next = Some(std::mem::take(&mut scene.sheets));
         }
         self.scene = scene;
@@ -238,7 +304,7 @@ impl<'m> Hanging<'m> {
         for place in &scene.sheets {
             let known = |hung: &Arc<Hung>| hung.key.number == place.key.number;
             let line: HashSet<u64> = view.descent.line(place.key.module).collect();
-            let mut all = self.hung.iter().map(|(hung, _)| hung).chain(&view.births);
+            let mut all = self.hung.iter().map(|hanger| &hanger.hung).chain(&view.births);
             if all.any(|hung| known(hung) && line.contains(&hung.key.module)) {
                 continue;
             }
@@ -269,32 +335,58 @@ impl<'m> Hanging<'m> {
         Ok(Hung { key: place.key, origin: place.origin, sheet: place.sheet, made, begin: now })
     }
 
-    /// Follows all sheets through the tick.
-    fn solve(&mut self, view: &View) -> Result<Vec<Track>, Error> {
+    /// The sheets in the order in which they are followed, with those that are born in a view.
+    pub(crate) fn hangers(&self, view: &View) -> Vec<Hanger> {
+        let born = |hung: &Arc<Hung>| {
+            let state = State::at_rest(&hung.made);
+            Hanger { hung: hung.clone(), state, forces: Vec::new() }
+        };
+        self.hung.iter().cloned().chain(view.births.iter().map(born)).collect()
+    }
+
+    /// The height of the ground, if there is one, where solids that stand still are.
+    pub(crate) fn floor(&self) -> Option<Stand> {
+        self.place.ground.map(|height| Stand::at(Vector::new(0.0, height, 0.0)))
+    }
+
+    /// Follows all sheets through a span.
+    pub(crate) fn solve(&mut self, view: &View, (begin, length): (f64, f64)) -> Result<Vec<Track>, Error> {
         let ways: Vec<_> = view.paths.iter().map(|path| |time: f64| path.place(time)).collect();
         let mut solids: Vec<Solid> =
             view.paths.iter().zip(&ways).map(|(path, way)| Solid::guided(&path.shape, way)).collect();
         let floor = Shape::half_space();
-        let height = self.place.ground;
-        let ground = move |_: f64| Stand::at(Vector::new(0.0, height.unwrap_or_default(), 0.0));
-        if height.is_some() {
+        let below = self.floor();
+        let ground = move |_: f64| below.unwrap_or(Stand::at(Vector::zeros()));
+        if below.is_some() {
             solids.push(Solid::guided(&floor, &ground));
         }
-        let mut tracks = Vec::with_capacity(self.hung.len() + view.births.len());
-        let born = view.births.iter().map(|hung| (hung.clone(), State::at_rest(&hung.made)));
-        let (begin, end) = (self.begin(), self.begin() + TICK);
-        for (hung, mut state) in self.hung.iter().cloned().chain(born) {
-            let from = hung.begin.max(begin);
-            let mut steps = vec![(from, state.clone())];
+        let span = begin..begin + length;
+        self.hangers(view)
+            .into_iter()
+            .map(|hanger| self.follow(hanger, &solids, span.clone(), |_| ()))
+            .collect()
+    }
+
+    /// Follows a sheet through a span of seconds.
+    pub(crate) fn follow(
+        &mut self,
+        Hanger { hung, mut state, .. }: Hanger,
+        solids: &[Solid],
+        span: std::ops::Range<f64>,
+        mut observe: impl FnMut(&Step),
+    ) -> Result<Track, Error> {
+        let from = hung.begin.max(span.start);
+        let mut steps = vec![(from, state.clone())];
+        if from < span.end {
             let wind = Gusts(&self.wind);
-            let observe = |step: &Step| steps.push((step.to, step.after.clone()));
-            if from < end {
-                let done = self.solver.advance(&hung.made, &mut state, from..end, &solids, &wind, observe);
-                done.map_err(|error| self.failed(&hung, error))?;
-            }
-            tracks.push(Track { hung, steps });
+            let note = |step: &Step| {
+                steps.push((step.to, step.after.clone()));
+                observe(step);
+            };
+            let done = self.solver.advance(&hung.made, &mut state, from..span.end, solids, &wind, note);
+            done.map_err(|error| self.failed(&hung, error))?;
         }
-        Ok(tracks)
+        Ok(Track { hung, steps, forces: Vec::new() })
     }
 
     /// A sheet that cannot be followed.
@@ -308,29 +400,42 @@ impl<'m> Hanging<'m> {
         self.wind.failure().unwrap_or(Error::Sheet { name: declared.name.clone(), error, time, span })
     }
 
-    /// The next tick begins.
-    fn end(&mut self, view: View, tracks: Vec<Track>) -> Result<Tick, Error> {
-        let last = |track: &Track| track.steps.last().map(|(_, state)| (track.hung.clone(), state.clone()));
-        let mut hung: Vec<(Arc<Hung>, State)> = tracks.iter().filter_map(last).collect();
+    /// The next tick begins, or the next part of one. Also returns why growth fails before, if it does.
+    pub(crate) fn end(
+        &mut self,
+        (begin, length): (f64, f64),
+        (view, growth): (View, Simulation<'m>),
+        tracks: Vec<Track>,
+        forces: BTreeMap<u64, Line>,
+    ) -> (Part, Option<Error>) {
+        let last = |track: &Track| {
+            let (_, state) = track.steps.last()?;
+            let mean = |(module, line): &(u64, Line)| (*module, Line::constant(line.mean(length)));
+            let forces = track.forces.iter().map(mean).collect();
+            // Solids that are led begin anew.
+            let state = state.clone().with(Vec::new());
+            Some(Hanger { hung: track.hung.clone(), state, forces })
+        };
+        let mut hung: Vec<Hanger> = tracks.iter().filter_map(last).collect();
         if let Some(places) = &view.next {
-            let mut here: Vec<(Arc<Hung>, State)> = Vec::with_capacity(places.len());
+            let mut here: Vec<Hanger> = Vec::with_capacity(places.len());
             for place in places {
                 let before = view.descent.line(place.key.module).find_map(|module| {
                     let key = SheetKey { module, ..place.key };
-                    hung.iter().find(|(hung, _)| hung.key == key)
+                    hung.iter().find(|hanger| hanger.hung.key == key)
                 });
-                let Some((before, state)) = before else { continue };
-                let Hung { sheet, ref made, begin, .. } = **before;
+                let Some(before) = before else { continue };
+                let Hung { sheet, ref made, begin, .. } = *before.hung;
                 let made = Arc::clone(made);
-                let next = Hung { key: place.key, origin: place.origin, sheet, made, begin };
-                here.push((Arc::new(next), state.clone()));
+                let next = Arc::new(Hung { key: place.key, origin: place.origin, sheet, made, begin });
+                here.push(Hanger { hung: next, ..before.clone() });
             }
             hung = here;
         }
         self.hung = hung;
-        let number = self.number;
-        self.number += 1;
-        Ok(Tick { number, tracks, descent: view.descent, failed: view.failed })
+        self.growth = growth;
+        let part = Part { end: begin + length, tracks, descent: view.descent, forces };
+        (part, view.failed)
     }
 }
 

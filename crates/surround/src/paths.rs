@@ -17,7 +17,7 @@ use crate::place::Place;
 use crate::points::{Pair, rigid_motion};
 use crate::solids::{MOST_BODIES, corners, rounded};
 
-/// The instants of a tick at which solids are drawn, in parts of it.
+/// The instants of a tick, or of a part of one, at which solids are drawn, in parts of it.
 pub(crate) const INSTANTS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
 /// Most iterations to find a rotation, each of which squares the error.
 const ITERATIONS: usize = 8;
@@ -51,6 +51,8 @@ impl Cubic {
 /// A solid on its way through a tick.
 #[derive(Clone, Debug)]
 pub(crate) struct Path {
+    /// The module that draws it where the path begins.
+    pub(crate) origin: Origin,
     pub(crate) shape: Shape,
     /// Where the tick begins, and its length, in s.
     begin: f64,
@@ -177,7 +179,7 @@ fn path(first: &Drawn, later: &[Option<Vec<Vector>>; 3], (begin, length): (f64, 
         }
     }
     let (centre, turn) = (Cubic::through(centres), Cubic::through(turns));
-    Some(Path { shape, begin, length, centre, turn })
+    Some(Path { origin: first.origin, shape, begin, length, centre, turn })
 }
 
 /// The rotation vector that leads from places about one centre to places about another, as near as that is possible. `guess` is one for an instant before.

@@ -11,7 +11,7 @@ use dlsys_geometry::scene::{
 use dlsys_geometry::turtle;
 use dlsys_model::{self as model, Model};
 use dlsys_sheet::{Counts, State};
-use dlsys_sim::Settings;
+use dlsys_sim::{Settings, Simulation};
 
 use crate::Error;
 use crate::coupled;
@@ -54,7 +54,11 @@ impl<'m> Sheets<'m> {
         }
         let place = Place::of_scene(&model.scenery);
         let settings = Settings { log: true, transitions: false, ..settings };
-        let growth = coupled::start(model, settings, place)?;
+        // Forces of sheets on solids are computed here.
+        let growth = match model.reads_force() {
+            true => Simulation::new(model, settings)?,
+            false => coupled::start(model, settings, place)?,
+        };
         let wind = Arc::new(Sampler::new(Weather::around_bodies(&model.scenery)?, place));
         let start = Hanging::new(model, (growth, place), wind, settings.bending.tolerance);
         let (past, marks) = (Recent::new(MOST_KEPT), Marks::new(MOST_MARKED));
@@ -73,15 +77,16 @@ impl<'m> Sheets<'m> {
         }
         let seconds = self.place.seconds(time).max(0.0);
         let tick = self.tick(time, seconds)?;
+        let Some(part) = tick.part(seconds) else { return Ok(()) };
         let tracks: HashMap<SheetKey, usize> =
-            tick.tracks.iter().enumerate().map(|(i, track)| (track.hung.key, i)).collect();
+            part.tracks.iter().enumerate().map(|(i, track)| (track.hung.key, i)).collect();
         let places = scene.sheets.clone();
         for place in &places {
-            let known = tick
+            let known = part
                 .descent
                 .line(place.key.module)
                 .find_map(|module| tracks.get(&SheetKey { module, ..place.key }));
-            let state = known.and_then(|track| tick.tracks[*track].at(seconds));
+            let state = known.and_then(|track| part.tracks[*track].at(seconds));
             self.add(place, state, scene);
         }
         Ok(())
@@ -96,6 +101,11 @@ impl<'m> Sheets<'m> {
     /// The tick within which a time lies; a time at the end of a tick belongs to that.
     fn tick(&self, time: f64, seconds: f64) -> Result<Arc<Tick>, Error> {
         let number = ((seconds / TICK).ceil() - 1.0).max(0.0);
+        self.tick_of(number, time)
+    }
+
+    /// The tick of a number, for a time of the model.
+    pub(crate) fn tick_of(&self, number: f64, time: f64) -> Result<Arc<Tick>, Error> {
         if number > MOST_TICKS {
             let second = self.place.units.time;
             return Err(Error::TooLong { most: MOST_TICKS, time, seconds: second, span: self.span() });

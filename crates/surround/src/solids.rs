@@ -20,6 +20,7 @@ use dlsys_tree::ModuleString;
 use dlsys_wind::{Hull, Obstacle};
 use nalgebra::Vector3;
 
+use crate::coupled;
 use crate::descent::Descent;
 use crate::motion::MOST_TICKS;
 use crate::place::Place;
@@ -110,7 +111,7 @@ impl<'m> Solids<'m> {
         let (number, part) = (place as u64, place.fract());
         let mut track = self.track.lock().unwrap_or_else(PoisonError::into_inner);
         if track.as_ref().is_none_or(|track| number < track.first) {
-            let growth = Simulation::new(self.model, self.settings)?;
+            let growth = coupled::start(self.model, self.settings, self.place)?;
             let (scene, string) = (turtle::blank(self.model), ModuleString::default());
             let (kept, spent) = (VecDeque::new(), track.as_ref().map_or(Duration::ZERO, |track| track.spent));
             *track = Some(Track { growth, scene, string, first: 0, kept, size: 0, spent });

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::scene::ScenePart;
 use super::text::wrapped;
-use crate::model::Model;
+use crate::model::{Model, Quantity};
 use crate::sim::{Settings, Simulation, brief};
 use crate::surround::{self, Axis, CLOCK, MOST_TICKS, Survey, Vibration};
 use crate::sway::Air;
@@ -369,7 +369,7 @@ fn part(
 
 /// Whether the stems act on growth.
 fn ways(model: &Model) -> String {
-    let readers = (model.kinds.iter()).filter(|(_, kind)| kind.strain_parameter().is_some());
+    let readers = (model.kinds.iter()).filter(|(_, kind)| kind.input_parameter(Quantity::Strain).is_some());
     let readers: Vec<&str> = readers.map(|(_, kind)| &*kind.name).collect();
     match model.reads_strain() {
         true => format!(

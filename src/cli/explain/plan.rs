@@ -12,7 +12,7 @@ use super::sheet;
 use super::{given, words};
 use crate::diagnostic::Source;
 use crate::model::{
-    Class, Condition, DRAWN_WORDS, Kind, Model, Produce, Rule, SolutionForm, Solve, ZeroCrossing,
+    Class, Condition, DRAWN_WORDS, Kind, Model, Produce, Quantity, Rule, SolutionForm, Solve, ZeroCrossing,
 };
 use crate::session::Session;
 
@@ -328,17 +328,29 @@ impl Facts<'_> {
         let mut kinds = model.kinds.iter().filter(|(_, kind)| kind.rules.contains(&rule));
         let coupled = kinds.any(|(id, _)| self.work[id.index()] == Work::Coupled);
         let shown = compiled.parameters.len() - compiled.hidden;
-        let strain = self.strain(rule);
-        let is_named = |v: usize| v < shown || self.clock(compiled, v).is_some() || Some(v) == strain;
+        let inputs = self.inputs(rule);
+        let input =
+            |v: usize| inputs.iter().find(|(_, parameter)| *parameter == v).map(|(quantity, _)| *quantity);
+        let is_named = |v: usize| v < shown || self.clock(compiled, v).is_some() || input(v).is_some();
         (0..compiled.parameters.len())
             .filter(|v| is_named(*v))
             .map(|parameter| {
                 let name = self.name(compiled, parameter).unwrap_or_default();
-                if Some(parameter) == strain {
-                    let why =
-                        "follows from the bending of the stem, at the ticks of its grid of time".to_owned();
+                if let Some(quantity) = input(parameter) {
+                    let why = match quantity.is_force() {
+                        true => {
+                            "follows from what sheets do to the solid, at the ticks of their grid of time"
+                        }
+                        false => "follows from the bending of the stem, at the ticks of its grid of time",
+                    };
                     let law = Some("linear from tick to tick".to_owned());
-                    return ParameterPlan { name, class: "given", law, why, reads: Vec::new() };
+                    return ParameterPlan {
+                        name,
+                        class: "given",
+                        law,
+                        why: why.to_owned(),
+                        reads: Vec::new(),
+                    };
                 }
                 if let Some(place) = solve.algebraic.of.iter().position(|p| *p == parameter) {
                     return given::parameter(self, compiled, solve, place);
@@ -395,10 +407,10 @@ impl Facts<'_> {
         ConditionPlan { boundary, line, decides, found }
     }
 
-    /// The number of `strain` among the parameters of a rule, if its modules have one.
-    fn strain(&self, rule: usize) -> Option<usize> {
+    /// The numbers of what the surroundings give among the parameters of a rule.
+    fn inputs(&self, rule: usize) -> Vec<(Quantity, usize)> {
         let mut kinds = self.model.kinds.iter().filter(|(_, kind)| kind.rules.contains(&rule));
-        kinds.find_map(|(_, kind)| kind.strain_parameter())
+        kinds.next().map_or_else(Vec::new, |(_, kind)| kind.read_inputs().collect())
     }
 
     /// The name of a variable of a rule; None for truth values.

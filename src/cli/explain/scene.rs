@@ -87,7 +87,14 @@ fn solid(model: &Model) -> Option<ScenePart> {
         (_, true) => {
             let around = "the wind flows around the convex hull of each body; their places are those of growth at 120 instants a second, \
                 with straight lines in between";
-            let met = "sheets meet the convex hull of each body on the way on which the equations of the model lead it";
+            let met = match model.reads_force() {
+                true => {
+                    "sheets meet the convex hull of each body and push it, and the equations of the model read the force"
+                }
+                false => {
+                    "sheets meet the convex hull of each body on the way on which the equations of the model lead it"
+                }
+            };
             let why = match (sways(model) || turtle::lets_out(model), turtle::drapes(model)) {
                 (true, true) => format!("{around}; {met}"),
                 (true, false) => around.to_owned(),

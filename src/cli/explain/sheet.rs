@@ -1,7 +1,7 @@
 //! Sheets (`sheet`): what they are made of, the work of following them, and how they are coupled to the model.
 
 use super::scene::ScenePart;
-use crate::model::{Model, Sheet};
+use crate::model::{Model, Quantity, Sheet};
 use crate::sim::brief;
 use crate::surround::SHEET_TICK;
 use crate::turtle;
@@ -37,11 +37,33 @@ fn why(model: &Model, sheet: &Sheet) -> String {
     let meets = if meets.is_empty() { String::new() } else { format!(" and {}", meets.join(", ")) };
     format!(
         "{} points, {} faces and {} cords of {}, held at {held}; implicit steps of controlled error under weight{meets}, \
-        in {} ticks of 1/64 s; one way: no rule reads what it does",
+        in {} ticks of 1/64 s; {}",
         sheet.points.len(),
         sheet.faces.len(),
         sheet.cords.len(),
         tissue.name,
         brief((seconds / SHEET_TICK).ceil(), 6),
+        ways(model),
+    )
+}
+
+/// Whether sheets act on growth.
+fn ways(model: &Model) -> String {
+    let mut names: Vec<&str> = Vec::new();
+    let mut forces: Vec<Quantity> = Vec::new();
+    for (_, kind) in model.kinds.iter().filter(|(_, kind)| kind.reads_force()) {
+        names.push(&kind.name);
+        forces.extend(kind.read_inputs().map(|(quantity, _)| quantity));
+    }
+    if names.is_empty() {
+        return "one way: no rule reads what it does".to_owned();
+    }
+    forces.sort();
+    forces.dedup();
+    let forces: Vec<String> = forces.iter().map(|quantity| format!("`{}`", quantity.name())).collect();
+    format!(
+        "two ways: rules of {} read {}, and growth and sheets go on together, each tick in as many parts as the tolerance needs",
+        names.join(", "),
+        forces.join(", ")
     )
 }

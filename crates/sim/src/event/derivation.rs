@@ -50,7 +50,7 @@ impl Steps {
         };
         let has_rules = model.kinds.iter().map(|(_, kind)| !kind.steps.is_empty());
         let is_settled = (model.kinds.iter()).map(|(_, kind)| {
-            let rests = kind.rules.is_empty() && kind.strain_parameter().is_none();
+            let rests = kind.rules.is_empty() && kind.read_inputs().next().is_none();
             rests && kind.steps.iter().all(|r| reads_itself(&model.rules[*r]))
         });
         let exact = exact_atoms(model);

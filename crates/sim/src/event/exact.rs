@@ -31,9 +31,9 @@ fn inexact(model: &Model) -> Vec<Vec<bool>> {
             for solve in kind.all_rules().flat_map(|rule| &model.rules[rule].solves) {
                 solve.of.iter().chain(&solve.algebraic.of).for_each(|p| moves[*p] = true);
             }
-            // Where there are discrete rules only, the strain moves without an equation.
-            if let Some(strain) = kind.strain_parameter() {
-                moves[strain] = true;
+            // Where there are discrete rules only, what the surroundings give moves without an equation.
+            for (_, parameter) in kind.read_inputs() {
+                moves[parameter] = true;
             }
             moves
         })

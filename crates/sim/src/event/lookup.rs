@@ -37,8 +37,8 @@ impl EventStage<'_, '_> {
                 && !self.begin_predicted(id, rule)
             {
                 self.take_up(id, rule, &Context::default());
-            } else if self.setup.reads_strain && model.kinds.get(kind).rules.is_empty() {
-                self.world.bend_at_rest(model, id, self.instant.at);
+            } else if self.setup.reads_inputs && model.kinds.get(kind).rules.is_empty() {
+                self.world.let_inputs_go_on(model, id, self.instant.at);
             }
         }
         clear(&mut fresh);
@@ -75,7 +75,7 @@ impl EventStage<'_, '_> {
                     self.world.rebase(id, self.instant.at);
                     self.flow().forget(id);
                     self.world.new_state(id).restarted = self.instant.number;
-                    self.world.bend_at_rest(model, id, self.instant.at);
+                    self.world.let_inputs_go_on(model, id, self.instant.at);
                     self.events.ready.push(id);
                 }
                 continue;
@@ -93,9 +93,14 @@ impl EventStage<'_, '_> {
 
     /// Gives a module its rule and opens it.
     pub fn take_up(&mut self, id: ModuleId, rule: usize, context: &Context) {
+        self.take_up_with(id, rule, context, &[]);
+    }
+
+    /// The same with new values of some parameters.
+    pub fn take_up_with(&mut self, id: ModuleId, rule: usize, context: &Context, given: &[(usize, f64)]) {
         let compiled = &self.setup.model.rules[rule];
         let error = self.flows.error_of(self.world, id);
-        self.world.rebase(id, self.instant.at);
+        self.world.rebase_with(id, self.instant.at, given);
         let now = self.instant.at;
         if let Some(state) = self.world.state_mut(id) {
             state.pass_changes(now);

@@ -157,7 +157,7 @@ pub struct Lives {
 }
 
 impl Lives {
-    /// No classes yet. A kind can have some if its rule needs no context, has rates only and does not read `strain`, and no
+    /// No classes yet. A kind can have some if its rule needs no context, has rates only and reads nothing of the surroundings, and no
     /// rule looks for it as a context.
     pub fn new(model: &Model, kinds_with_context: &[bool]) -> Lives {
         let mut seen = vec![false; model.kinds.len()];
@@ -170,8 +170,8 @@ impl Lives {
         let rules = (model.kinds.iter())
             .map(|(id, kind)| {
                 let alone = !kinds_with_context[id.index()] && !seen[id.index()] && kind.steps.is_empty();
-                // The surroundings change the strain at any time.
-                let alone = alone && kind.strain_parameter().is_none();
+                // The surroundings change what they give at any time.
+                let alone = alone && kind.read_inputs().next().is_none();
                 // Algebraic parameters must be made consistent first.
                 kind.rules.first().copied().filter(|rule| alone && !model.rules[*rule].is_algebraic())
             })

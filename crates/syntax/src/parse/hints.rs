@@ -216,6 +216,9 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (_, ".") if text[at + 1..].starts_with("strain") => {
             "a rule reads its own `strain` only: let the neighbour hold its own in a parameter, `solve s = strain`, and read that"
         }
+        (_, ".") if text[at + 1..].starts_with("force_") => {
+            "a rule reads the force on its own solid only: let the neighbour hold its own in a parameter, `solve f = force_y`, and read that"
+        }
         (Some(')'), ":") if in_rule && !before.contains(':') => {
             "a rule has one predecessor; modules around it are its context: `A(x) < B(y) > C(z):`"
         }

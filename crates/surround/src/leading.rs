@@ -1,0 +1,513 @@
+//! Sheets and solids both ways: a part of a tick is gone through until growth and the mechanics of the sheets agree on it.
+//!
+//! ```text
+//!    growth under forces F ──▶ paths of the solids
+//!      ▲                          │
+//!      │                          ▼
+//!    forces, linear in time ◀── sheets, with solids that are led: on their paths, free to deviate by their mass
+//! ```
+//!
+//! Equations of motion stand in the rules of the model; of them, the mechanics gets the inverse of the mass, which is measured: growth goes on under a small force
+//! more along each axis, and the way that it makes more is F h²/2m. With that, contacts are solved as for free solids, implicitly and with equal and opposite
+//! impulses. Growth under the forces that result ends where the mechanics has the solid, to rounding if its equations are linear. If not, the way under the new
+//! forces is the next path. A part is accepted if both agree at its end, and, within the tolerance, on the way; if they do not get there, it is halved.
+
+use std::collections::BTreeMap;
+
+use dlsys_geometry::turtle::Origin;
+use dlsys_model::Quantity;
+use dlsys_sheet::{Led, Matrix, Place as Stand, Shape, Solid, Step, Vector};
+use dlsys_sim::Simulation;
+use nalgebra::SymmetricEigen;
+
+use crate::Error;
+use crate::descent::Descent;
+use crate::error::CouplingFault;
+use crate::hanging::{Hanger, Hanging, Part, TICK, Track, View};
+use crate::line::{Exerted, Line};
+use crate::paths::{INSTANTS, Path};
+
+/// Most halvings of a tick.
+const DEEPEST: u32 = 14;
+/// Most times that growth goes through a part.
+const PASSES: usize = 8;
+/// Most times that all sheets are gone through, where several push one solid.
+const ROUNDS: usize = 12;
+/// How far the ends may be apart, and what counts as no change of a force, in parts of what is allowed on the way.
+const NEAR: f64 = 0.1;
+const SAME: f64 = 0.01;
+/// The next part is longer if the distance on the way is below this part of what is allowed.
+const ROOM: f64 = 0.15;
+/// The way of a solid by which its mass is measured, in parts of its size, and most tries to find the force for it.
+const PROBE: f64 = 1e-3;
+const TRIES: usize = 5;
+/// A mass makes a ninth of its way in the first third of a span. What makes all of it, but for this part, jumps with the force.
+const JUMP: f64 = 0.1;
+/// A part of an inverse mass that a mass does not have, relative to it, and still counts as an error of growth.
+const SKEW: f64 = 0.05;
+
+/// What goes on from part to part.
+#[derive(Clone, Default)]
+pub(crate) struct Leading {
+    /// The inverse masses (1/kg) of solids that have been measured, by their modules.
+    masses: BTreeMap<u64, Matrix>,
+    /// Productions of the part before.
+    descent: Descent,
+    /// m of the length TICK/2^m.
+    level: u32,
+}
+
+/// A solid whose rules read the force on it.
+struct Body {
+    /// Its number among the paths.
+    path: usize,
+    module: u64,
+    /// Its inverse mass in 1/kg.
+    light: Matrix,
+}
+
+/// What one sheet does under forces of others: its track, its force on each body, and how that makes them deviate.
+struct Pushed {
+    track: Track,
+    forces: Vec<Line>,
+    deviations: Vec<Deviation>,
+}
+
+/// How far a body is from its path at all instants but the first, and its velocity relative to it at the last one.
+#[derive(Clone, Copy, Default)]
+struct Deviation {
+    ways: [Vector; 3],
+    velocity: Vector,
+}
+
+/// All sheets of a span that agree with one another: tracks, forces by sheet and body, deviations by body.
+struct Solved {
+    tracks: Vec<Track>,
+    forces: Vec<Vec<Line>>,
+    deviations: Vec<Deviation>,
+}
+
+/// A part that is accepted, why growth fails in it, and how far both ways are apart, in parts of what is allowed.
+type Accepted = (Part, Option<Error>, f64);
+
+impl<'m> Hanging<'m> {
+    /// Goes through the next part of a tick, from a time in s on.
+    pub(crate) fn both_ways(
+        &mut self,
+        begin: f64,
+        leading: &mut Leading,
+    ) -> Result<(Part, Option<Error>), Error> {
+        loop {
+            let length = TICK / f64::from(leading.level).exp2();
+            match self.attempt((begin, length), leading)? {
+                Ok((part, failed, apart)) => {
+                    let aligned = ((begin + length - self.begin()) / (2.0 * length)).fract() == 0.0;
+                    if leading.level > 0 && aligned && apart < ROOM {
+                        leading.level -= 1;
+                    }
+                    leading.descent = part.descent.clone();
+                    return Ok((part, failed));
+                }
+                Err(error) if leading.level == DEEPEST => return Err(error),
+                Err(_) => leading.level += 1,
+            }
+        }
+    }
+
+    /// Tries a span. The inner error is that it is too long.
+    fn attempt(&mut self, span: (f64, f64), leading: &mut Leading) -> Result<Result<Accepted, Error>, Error> {
+        // The forces of the part before are the first guess.
+        let mut guess: BTreeMap<u64, Line> = BTreeMap::new();
+        for (module, line) in self.hung.iter().flat_map(|hanger| &hanger.forces) {
+            let sum = guess.entry(*module).or_default();
+            *sum = sum.plus(line);
+        }
+        let (mut growth, mut view) = self.led(span, (&guess, &leading.descent))?;
+        let readers: Vec<(usize, u64)> = {
+            let all = view.paths.iter().enumerate().filter(|(_, path)| self.reads(path));
+            all.map(|(i, path)| (i, path.origin.lineage.id)).collect()
+        };
+        let Some(&(first, _)) = readers.first() else {
+            let tracks = self.solve(&view, span)?;
+            let (part, failed) = self.end(span, (view, growth), tracks, BTreeMap::new());
+            return Ok(Ok((part, failed, 0.0)));
+        };
+        let mut given = {
+            let exerted = Exerted { forces: &guess, since: &leading.descent };
+            let lines = readers.iter().map(|(_, module)| (*module, exerted.on(*module)));
+            lines.filter(|(_, line)| *line != Line::default()).collect()
+        };
+        let mut bodies = self.weigh(&readers, (&view, span), &given, (leading, false))?;
+        let mut shares = self.shares(&view, &bodies, &leading.descent);
+        let mut worst = (f64::INFINITY, 0.0);
+        for pass in 0..PASSES {
+            let Some(solved) = self.go_around((&view, span), &bodies, &shares)? else { break };
+            let forces = total(&solved.forces, &bodies);
+            if forces.is_empty() && given.is_empty() {
+                let (part, failed) = self.end(span, (view, growth), solved.tracks, forces);
+                return Ok(Ok((part, failed, 0.0)));
+            }
+            let (next_growth, next) = self.led(span, (&forces, &Descent::default()))?;
+            let allowed = self.allowed(&solved.tracks);
+            let [at_end, between] = distances([&view, &next], &bodies, &solved.deviations, span);
+            let agrees = view.births.len() == next.births.len() && at_end <= NEAR * allowed;
+            if agrees && between <= allowed || next.failed.is_some() {
+                let apart = at_end.max(between) / allowed;
+                let (part, failed) = self.end(span, (next, next_growth), solved.tracks, forces);
+                return Ok(Ok((part, failed, apart)));
+            }
+            worst = (at_end.max(between), allowed);
+            if agrees {
+                // A line is too little for what happens in the span.
+                break;
+            }
+            (given, shares, view, growth) = (forces, solved.forces, next, next_growth);
+            shares.resize(self.hung.len() + view.births.len(), vec![Line::default(); bodies.len()]);
+            if pass == 0 {
+                bodies = self.weigh(&readers, (&view, span), &given, (leading, true))?;
+            }
+        }
+        let (by, allowed) = worst;
+        let fault = CouplingFault::Apart { by, allowed, step: span.1 };
+        Ok(Err(self.fails(&view.paths[first].origin, span.0, fault)))
+    }
+
+    /// Growth through a span, under forces on modules before some productions.
+    fn led(
+        &mut self,
+        span: (f64, f64),
+        (forces, since): (&BTreeMap<u64, Line>, &Descent),
+    ) -> Result<(Simulation<'m>, View), Error> {
+        let mut growth = self.growth.clone();
+        let view = self.look(&mut growth, span, Some(&Exerted { forces, since }))?;
+        Ok((growth, view))
+    }
+
+    /// Whether the rules of the module of a solid read the force on it.
+    fn reads(&self, path: &Path) -> bool {
+        self.model.kinds.get(path.origin.kind).reads_force()
+    }
+
+    /// The first guess of the force of each sheet on each body.
+    fn shares(&self, view: &View, bodies: &[Body], since: &Descent) -> Vec<Vec<Line>> {
+        let on = |hanger: &Hanger, body: &Body| {
+            let find =
+                |id: u64| hanger.forces.iter().find(|(module, _)| *module == id).map(|(_, line)| *line);
+            since.line(body.module).find_map(find).unwrap_or_default()
+        };
+        self.hangers(view).iter().map(|hanger| bodies.iter().map(|body| on(hanger, body)).collect()).collect()
+    }
+
+    /// The distance that is allowed on the way, in m.
+    fn allowed(&self, tracks: &[Track]) -> f64 {
+        let extent = |track: &Track| track.hung.made.extent();
+        let pushing = tracks.iter().filter(|track| !track.forces.is_empty()).map(extent);
+        let least = pushing.fold(f64::INFINITY, f64::min);
+        let least = if least.is_finite() { least } else { tracks.iter().map(extent).fold(1.0, f64::min) };
+        self.solver.settings.tolerance * least
+    }
+
+    /// Goes through all sheets under the forces of all others, until none changes any more. `shares` are the forces under which growth has found the paths.
+    /// `None` if they come to no end.
+    fn go_around(
+        &mut self,
+        (view, span): (&View, (f64, f64)),
+        bodies: &[Body],
+        shares: &[Vec<Line>],
+    ) -> Result<Option<Solved>, Error> {
+        let hangers = self.hangers(view);
+        let extent = hangers.iter().map(|hanger| hanger.hung.made.extent()).fold(f64::INFINITY, f64::min);
+        let same = SAME * self.solver.settings.tolerance * extent;
+        let is_same = |a: &[Line], b: &[Line]| {
+            bodies.iter().zip(a.iter().zip(b)).all(|(body, (a, b))| {
+                let [impulse, integral] = a.minus(b).moments(span.1);
+                (body.light * impulse).norm() * span.1 + (body.light * integral).norm() <= same
+            })
+        };
+        let mut all: Vec<Option<(Pushed, Vec<Line>)>> = hangers.iter().map(|_| None).collect();
+        for _ in 0..ROUNDS {
+            let mut changed = false;
+            for k in 0..hangers.len() {
+                let mut others = vec![Line::default(); bodies.len()];
+                for (j, other) in all.iter().enumerate().filter(|(j, _)| *j != k) {
+                    let Some((pushed, _)) = other else { continue };
+                    for (b, sum) in others.iter_mut().enumerate() {
+                        *sum = sum.plus(&pushed.forces[b].minus(&shares[j][b]));
+                    }
+                }
+                if !all[k].as_ref().is_some_and(|(_, then)| is_same(then, &others)) {
+                    let pushed = self.push((&hangers[k], &shares[k]), (view, span), bodies, &others)?;
+                    all[k] = Some((pushed, others));
+                    changed = true;
+                }
+            }
+            if !changed {
+                let mut solved = Solved {
+                    tracks: Vec::new(),
+                    forces: Vec::new(),
+                    deviations: vec![Deviation::default(); bodies.len()],
+                };
+                for (Pushed { track, forces, deviations }, _) in all.into_iter().flatten() {
+                    solved.tracks.push(track);
+                    solved.forces.push(forces);
+                    for (sum, one) in solved.deviations.iter_mut().zip(deviations) {
+                        sum.ways.iter_mut().zip(one.ways).for_each(|(sum, way)| *sum += way);
+                        sum.velocity += one.velocity;
+                    }
+                }
+                return Ok(Some(solved));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Follows a sheet through a span. `share` is its force in the paths, and `others` what other sheets do beyond theirs.
+    fn push(
+        &mut self,
+        (hanger, share): (&Hanger, &[Line]),
+        (view, (begin, length)): (&View, (f64, f64)),
+        bodies: &[Body],
+        others: &[Line],
+    ) -> Result<Pushed, Error> {
+        let body_of = |path: usize| bodies.iter().position(|body| body.path == path);
+        let way = |(index, path): (usize, &'_ Path)| {
+            let more = body_of(index).map(|b| (bodies[b].light, others[b]));
+            let path = path.clone();
+            move |time: f64| {
+                let place = path.place(time);
+                let Some((light, line)) = &more else { return place };
+                let [impulse, integral] = line.moments(time - begin);
+                let position = place.position + light * integral;
+                Stand { position, velocity: place.velocity + light * impulse, ..place }
+            }
+        };
+        let ways: Vec<_> = view.paths.iter().enumerate().map(way).collect();
+        let mut leds = Vec::with_capacity(bodies.len());
+        let mut solids = Vec::with_capacity(view.paths.len() + 1);
+        for (index, path) in view.paths.iter().enumerate() {
+            solids.push(match body_of(index) {
+                None => Solid::guided(&path.shape, &ways[index]),
+                Some(b) => {
+                    let led = Led::new(&ways[index], &bodies[b].light);
+                    let led = led.map_err(|_| self.fails(&path.origin, begin, CouplingFault::NoMass))?;
+                    let led = led.assuming(begin, share[b].force, share[b].rate);
+                    leds.push(led);
+                    Solid::led(&path.shape, led)
+                }
+            });
+        }
+        let floor = Shape::half_space();
+        let below = self.floor();
+        let ground = move |_: f64| below.unwrap_or(Stand::at(Vector::zeros()));
+        if below.is_some() {
+            solids.push(Solid::guided(&floor, &ground));
+        }
+        let mut hanger = hanger.clone();
+        hanger.state.bodies = vec![Led::start(); bodies.len()];
+        let end = begin + length;
+        let mut pushed = vec![[Vector::zeros(); 2]; bodies.len()];
+        let note = |step: &Step| {
+            for (sum, body) in pushed.iter_mut().zip(bodies) {
+                let impulse = step.pushes[body.path].impulse;
+                sum[0] += impulse;
+                sum[1] += impulse * (end - 0.5 * (step.from + step.to));
+            }
+        };
+        let mut track = self.follow(hanger, &solids, begin..end, note)?;
+        let mut forces = vec![Line::default(); bodies.len()];
+        let mut deviations = vec![Deviation::default(); bodies.len()];
+        for (b, led) in leds.iter().enumerate() {
+            let last = track.steps.last().map(|(_, state)| state.bodies[b]).unwrap_or(Led::start());
+            let deviation = &mut deviations[b];
+            for (way, part) in deviation.ways.iter_mut().zip(&INSTANTS[1..]) {
+                let state = track.at(begin + length * part);
+                *way = state.map_or(Vector::zeros(), |state| led.root() * state.bodies[b].position);
+            }
+            deviation.velocity = led.root() * last.velocity;
+            // What nothing touches is under no force, exactly.
+            if pushed[b] != [Vector::zeros(); 2] {
+                let [impulse, integral] = share[b].moments(length);
+                let beyond = led.effect(&last, [pushed[b][0] - impulse, pushed[b][1] - integral]);
+                forces[b] = Line::through([impulse + beyond[0], integral + beyond[1]], length);
+            }
+        }
+        let acting = bodies.iter().zip(&forces).filter(|(_, line)| **line != Line::default());
+        track.forces = acting.map(|(body, line)| (body.module, *line)).collect();
+        Ok(Pushed { track, forces, deviations })
+    }
+
+    /// The bodies with their inverse masses, which are measured where they are not known or `again`.
+    fn weigh(
+        &mut self,
+        readers: &[(usize, u64)],
+        (view, span): (&View, (f64, f64)),
+        given: &BTreeMap<u64, Line>,
+        (leading, again): (&mut Leading, bool),
+    ) -> Result<Vec<Body>, Error> {
+        let known =
+            |module: u64| leading.descent.line(module).find_map(|id| leading.masses.get(&id)).copied();
+        let all: Option<Vec<Matrix>> = readers.iter().map(|(_, module)| known(*module)).collect();
+        let lights = match all.filter(|_| !again) {
+            Some(all) => all,
+            None => self.measure(readers, (view, span), given)?,
+        };
+        let bodies = readers.iter().zip(lights);
+        let bodies: Vec<Body> =
+            bodies.map(|((path, module), light)| Body { path: *path, module: *module, light }).collect();
+        leading.masses = bodies.iter().map(|body| (body.module, body.light)).collect();
+        Ok(bodies)
+    }
+
+    /// Measures inverse masses: ways that growth makes more under a force more. The axes of the model are those of the scene.
+    fn measure(
+        &mut self,
+        readers: &[(usize, u64)],
+        (view, span): (&View, (f64, f64)),
+        given: &BTreeMap<u64, Line>,
+    ) -> Result<Vec<Matrix>, Error> {
+        let end = span.0 + span.1;
+        let reads: Vec<[bool; 3]> = readers
+            .iter()
+            .map(|(path, _)| {
+                let kind = self.model.kinds.get(view.paths[*path].origin.kind);
+                [0, 1, 2].map(|axis| kind.input_parameter(Quantity::Force(axis)).is_some())
+            })
+            .collect();
+        let mut lights = vec![Matrix::zeros(); readers.len()];
+        let mut jumps = vec![false; readers.len()];
+        for axis in 0..3 {
+            let mut strengths: Vec<f64> =
+                reads.iter().map(|reads| f64::from(u8::from(reads[axis]))).collect();
+            // At first the mass is not known at all; a force that is near the right one is good enough.
+            for _ in 0..TRIES {
+                let mut forces = given.clone();
+                for ((_, module), strength) in readers.iter().zip(&strengths) {
+                    let force = forces.entry(*module).or_default();
+                    force.force[axis] += strength;
+                }
+                if strengths.iter().all(|strength| *strength == 0.0) {
+                    break;
+                }
+                let (_, probe) = self.led(span, (&forces, &Descent::default()))?;
+                let mut is_good = true;
+                for (b, (path, _)) in readers.iter().enumerate() {
+                    if strengths[b] == 0.0 {
+                        continue;
+                    }
+                    let ends = probe.paths.get(*path).filter(|_| probe.failed.is_none());
+                    let here = &view.paths[*path];
+                    let wanted = PROBE * here.shape.reach();
+                    let way = ends.map(|there| {
+                        let [third, whole] = [span.0 + span.1 / 3.0, end]
+                            .map(|time| there.place(time).position - here.place(time).position);
+                        let is_seen = whole.norm() > JUMP * wanted;
+                        jumps[b] |= is_seen && (third - whole).norm() < JUMP * whole.norm();
+                        whole
+                    });
+                    let factor = match way {
+                        None => 1e-3,
+                        Some(way) => {
+                            let column = way * (2.0 / (strengths[b] * span.1 * span.1));
+                            lights[b].set_column(axis, &column);
+                            if way == Vector::zeros() { 1.0 } else { wanted / way.norm() }
+                        }
+                    };
+                    is_good &= (0.1..=10.0).contains(&factor);
+                    strengths[b] *= factor.clamp(1e-9, 1e9);
+                }
+                if is_good {
+                    break;
+                }
+            }
+        }
+        let masses = readers.iter().zip(lights.iter().zip(&reads).zip(&jumps));
+        masses
+            .map(|((path, _), ((light, reads), jumps))| {
+                let fault = || self.fails(&view.paths[*path].origin, span.0, CouplingFault::NoMass);
+                as_of_a_mass(light, reads).filter(|_| !jumps).ok_or_else(fault)
+            })
+            .collect()
+    }
+
+    /// A coupling that fails at a time in s.
+    fn fails(&self, origin: &Origin, begin: f64, fault: CouplingFault) -> Error {
+        let time = self.place.time_at(begin);
+        let kind = self.model.kinds.get(origin.kind).name.clone();
+        let mut declared = self.model.scenery.solids.iter();
+        let declared = || declared.find(|(kind, _)| *kind == origin.kind).map(|(_, span)| *span);
+        let span = origin.span(self.model).or_else(declared).unwrap_or_default();
+        Error::Coupling { kind, lineage: origin.lineage, time, fault, span }
+    }
+}
+
+/// The sum of the forces of all sheets on each body, of those that are not 0.
+fn total(forces: &[Vec<Line>], bodies: &[Body]) -> BTreeMap<u64, Line> {
+    let sum = |b: usize| forces.iter().fold(Line::default(), |sum, of_sheet| sum.plus(&of_sheet[b]));
+    let all = bodies.iter().enumerate().map(|(b, body)| (body.module, sum(b)));
+    all.filter(|(_, line)| *line != Line::default()).collect()
+}
+
+/// How far growth under new forces is from where the sheets have the bodies: at the end of the span, with what the difference of velocities makes in as long,
+/// and on the way, in m.
+fn distances(
+    [view, next]: [&View; 2],
+    bodies: &[Body],
+    deviations: &[Deviation],
+    (begin, length): (f64, f64),
+) -> [f64; 2] {
+    let (mut at_end, mut between) = (0.0_f64, 0.0_f64);
+    for (body, deviation) in bodies.iter().zip(deviations) {
+        let (Some(path), Some(other)) = (view.paths.get(body.path), next.paths.get(body.path)) else {
+            return [f64::INFINITY; 2];
+        };
+        for (way, part) in deviation.ways.iter().zip(&INSTANTS[1..]) {
+            let time = begin + length * part;
+            let (here, there) = (path.place(time), other.place(time));
+            let apart = (there.position - here.position - way).norm();
+            if *part < 1.0 {
+                between = between.max(apart);
+            } else {
+                let faster = (there.velocity - here.velocity - deviation.velocity).norm();
+                at_end = at_end.max(apart).max(faster * length);
+            }
+        }
+    }
+    // A distance that is no number is none that is allowed.
+    [at_end, between].map(|distance| if distance.is_nan() { f64::INFINITY } else { distance })
+}
+
+/// An inverse mass along the axes whose forces are read; `None` if no mass has it.
+fn as_of_a_mass(light: &Matrix, reads: &[bool; 3]) -> Option<Matrix> {
+    let read = Matrix::from_fn(|i, j| if reads[i] && reads[j] { light[(i, j)] } else { 0.0 });
+    let symmetric = (read + read.transpose()) / 2.0;
+    let found = SymmetricEigen::new(symmetric);
+    let (least, most) = (found.eigenvalues.min(), found.eigenvalues.max());
+    let skew = (read - symmetric).norm();
+    if !(least >= -SKEW * most && skew <= SKEW * most) {
+        return None;
+    }
+    let values = found.eigenvalues.map(|value| value.max(0.0));
+    let axes = found.eigenvectors;
+    Some(axes * Matrix::from_diagonal(&values) * axes.transpose())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_masses_are_masses() {
+        let with =
+            |rows: [[f64; 3]; 3], reads: [bool; 3]| as_of_a_mass(&Matrix::from_fn(|i, j| rows[i][j]), &reads);
+        let ball = [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]];
+        assert!(with(ball, [true; 3]).is_some_and(|light| (light - Matrix::identity() * 2.0).norm() < 1e-14));
+        let along_y = with(ball, [false, true, false]).expect("a mass");
+        assert!((along_y - Matrix::from_diagonal(&Vector::new(0.0, 2.0, 0.0))).norm() < 1e-14);
+        assert!(with([[0.0; 3]; 3], [true; 3]).is_some(), "what nothing moves");
+        assert!(with([[-1.0, 0.0, 0.0], [0.0; 3], [0.0; 3]], [true; 3]).is_none(), "against the force");
+        assert!(with([[1.0, 0.3, 0.0], [0.0, 1.0, 0.0], [0.0; 3]], [true; 3]).is_none());
+        // A pendulum that reads one force only, aslant.
+        let slope = [[0.5, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0; 3]];
+        assert!(with(slope, [true, false, false]).is_some_and(|light| (light[(0, 0)] - 0.5).abs() < 1e-15));
+    }
+}
