@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
+use crate::cover::Foot;
 use crate::error::check;
 use crate::graph::Graph;
 use crate::kernel::Law;
 use crate::load::Floors;
 use crate::material::REST;
 use crate::noise::variation;
-use crate::press::Foot;
 use crate::tile::{COLUMN_BYTES, Extent, Key, QUANTA, Tile};
 use crate::wedge::note;
 use crate::{Error, Relief, Soil};

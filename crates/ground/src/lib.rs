@@ -67,9 +67,12 @@
 #![warn(missing_docs)]
 
 mod clock;
+mod contour;
+mod cover;
 mod error;
 mod graph;
 mod ground;
+mod heading;
 mod heap;
 mod kernel;
 mod load;
