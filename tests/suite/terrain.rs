@@ -5,8 +5,13 @@ use dlsys::render::{FrameWriter, Survey, View};
 use dlsys::scene::{MaterialId, Scene};
 use dlsys::session::{Nursery, Session};
 use dlsys::sim::Settings;
+use dlsys::interchange::Format as Played;
 use dlsys::surround::Terrain;
 use dlsys::tree::ModuleString;
+
+use crate::glb::follow;
+use crate::glb_reader::{Glb, Shown};
+use crate::usd_reader::Usd;
 
 /// A ball that sinks into sand, and rests.
 const BALL: &str = "soil dry = sand\nground dry cell 0.01 depth 0.3 extent 0.5\nsolid Ball\ninitial string: Ball(0.2)\n\
@@ -122,6 +127,45 @@ fn pictures_and_files_have_the_ground() {
     assert!((high.x - low.x) < 0.25, "the ball only: {} to {}", low.x, high.x);
     let obj = String::from_utf8(FrameWriter::new(Format::OBJ, survey.fit()).write(&scene, "ball")).unwrap();
     assert!(obj.contains("\ng ground\nusemtl ground\n"));
+}
+
+/// The pieces of ground that a file shows, against the ground itself at a tick: the largest distance of a point of one from the other, beside the ball.
+fn apart(terrain: &Terrain, shown: &[Shown], time: f64) -> f64 {
+    let cell = 0.01;
+    let is_column = |p: &&dlsys::scene::Point| [p.x, p.z].iter().all(|x| (x / cell - (x / cell).round()).abs() < 1e-4);
+    let mut worst = 0.0_f64;
+    let mut compared = 0;
+    for point in shown.iter().flat_map(|piece| &piece.vertices).filter(is_column).filter(|p| p.x.hypot(p.z) > 0.12) {
+        worst = worst.max((point.y - terrain.height(time, [point.x, point.z], None).unwrap()).abs());
+        compared += 1;
+    }
+    let mesh = terrain.at(time, MaterialId::LEAF, None).unwrap();
+    for point in mesh.vertices.iter().filter(is_column).step_by(7) {
+        worst = worst.max(shown.iter().map(|piece| piece.distance(*point)).fold(f64::INFINITY, f64::min));
+    }
+    assert!(compared > 1000, "{compared} points");
+    worst
+}
+
+/// Files that play have the ground in pieces, at frames and at ticks between them within their accuracy.
+#[test]
+fn files_that_play_have_the_ground() {
+    let followed = follow(session(BALL), [0.0, 1.0, 0.05], 2);
+    let terrain = terrain(&followed.session, 1);
+    let allowed = followed.options.accuracy * followed.options.extent;
+    let bytes = followed.growth.file(Played::Glb).unwrap();
+    assert!(bytes.len() < 8_000_000, "{} bytes", bytes.len());
+    let glb = Glb::read(&bytes);
+    let usd = Usd::read(&String::from_utf8(followed.growth.file(Played::Usda).unwrap()).unwrap());
+    for tick in [0, 24, 61, 73, 90, 120] {
+        let time = f64::from(tick) / 120.0;
+        for all in [glb.shown(time), usd.shown(time)] {
+            let ground: Vec<Shown> =
+                all.into_iter().filter(|(name, _)| name.starts_with("ground")).map(|(_, shown)| shown).collect();
+            let worst = apart(&terrain, &ground, time);
+            assert!(worst <= allowed, "{worst} of {allowed} at {time}");
+        }
+    }
 }
 
 /// A rigid floor, and no floor, have no surface; the turtle is set down on soil as on a floor.
