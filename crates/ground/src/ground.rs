@@ -56,7 +56,6 @@ pub(crate) const TAU: f64 = 1.0 / 17.0;
 /// Thickness, in slopes of repose (at most 1), up to which loose material counts as none.
 const FILM: f64 = 1e-6;
 
-
 /// Sand, mud, snow or soil at an instant. Clones share their columns until one of them changes.
 #[derive(Clone, Debug)]
 pub struct Ground {

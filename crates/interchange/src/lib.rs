@@ -233,7 +233,8 @@ pub fn grow(
         true => gases::follow(session, settings, times, options, progress)?,
         false => Vec::new(),
     };
-    let allowed = Tolerance { likeness: 0.25 * tolerance, mix: 0.08 * tolerance, mix_of_nets: 0.4 * tolerance };
+    let allowed =
+        Tolerance { likeness: 0.25 * tolerance, mix: 0.08 * tolerance, mix_of_nets: 0.4 * tolerance };
     let lives = life::lives(&tracks.phases, allowed, 2.0 * instant);
     Ok(Growth {
         title: model.title.clone().unwrap_or_else(|| session.source.name.clone()),

@@ -22,7 +22,7 @@ use dlsys_geometry::turtle::{self, Strains};
 use dlsys_model::{self as model, Model};
 use dlsys_sim::{self as sim, Settings, Simulation, brief};
 use dlsys_surround::{
-    self as surround, Classes, Gases, Motion, Quilt, Passive as Following, Place, Sheets, Terrain, Weather,
+    self as surround, Classes, Gases, Motion, Passive as Following, Place, Quilt, Sheets, Terrain, Weather,
 };
 use dlsys_tree::ModuleString;
 

@@ -21,7 +21,6 @@ pub struct Quilt {
     material: MaterialId,
 }
 
-
 impl<'m> Terrain<'m> {
     /// The times of the ticks after a time of the model, up to another one.
     pub fn ticks(&self, from: f64, to: f64) -> impl Iterator<Item = f64> {
@@ -35,7 +34,12 @@ impl<'m> Terrain<'m> {
     ///
     /// # Errors
     /// As of [`Terrain::at`].
-    pub fn quilt(&self, until: f64, material: MaterialId, motion: Option<&Motion<'m>>) -> Result<Quilt, Error> {
+    pub fn quilt(
+        &self,
+        until: f64,
+        material: MaterialId,
+        motion: Option<&Motion<'m>>,
+    ) -> Result<Quilt, Error> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let moment = self.reach(&mut state, until, motion)?;
         let metre = self.place.units.length;

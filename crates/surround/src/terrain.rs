@@ -186,7 +186,12 @@ impl<'m> Terrain<'m> {
     }
 
     /// The ground at the tick at or before a time of the model.
-    pub(crate) fn reach(&self, state: &mut State<'m>, time: f64, motion: Option<&Motion<'m>>) -> Result<Moment, Error> {
+    pub(crate) fn reach(
+        &self,
+        state: &mut State<'m>,
+        time: f64,
+        motion: Option<&Motion<'m>>,
+    ) -> Result<Moment, Error> {
         let number = (self.place.seconds(time).max(0.0) * TICKS + SLACK).floor();
         if number > MOST_TICKS {
             let seconds = self.place.units.time;
