@@ -179,9 +179,6 @@ fn write(order: &Order<'_>, run: ModelRun, stale: &dyn Fn() -> bool) -> Result<(
     }
     if order.format == interchange::Format::Glb {
         run.note_missing_gases("a GLB file");
-        run.note_missing_ground("a GLB file");
-    } else {
-        run.note_missing_ground("a USDA file");
     }
     let mut clock = run.clock;
     let (survey, stats) = measure(order, &run, &mut clock)?;

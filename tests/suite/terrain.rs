@@ -1,12 +1,17 @@
 //! Ground of soil through the whole pipeline: `soil`, `ground SOIL cell …`, `solid`, `shelf` and `pour` from the text to columns, pictures and files.
 
 use dlsys::Format;
+use dlsys::interchange::Format as Played;
 use dlsys::render::{FrameWriter, Survey, View};
 use dlsys::scene::{MaterialId, Scene};
 use dlsys::session::{Nursery, Session};
 use dlsys::sim::Settings;
 use dlsys::surround::Terrain;
 use dlsys::tree::ModuleString;
+
+use crate::glb::follow;
+use crate::glb_reader::{Glb, Shown};
+use crate::usd_reader::Usd;
 
 /// A ball that sinks into sand, and rests.
 const BALL: &str = "soil dry = sand\nground dry cell 0.01 depth 0.3 extent 0.5\nsolid Ball\ninitial string: Ball(0.2)\n\
@@ -124,6 +129,51 @@ fn pictures_and_files_have_the_ground() {
     assert!(obj.contains("\ng ground\nusemtl ground\n"));
 }
 
+/// The pieces of ground that a file shows, against the ground itself at a tick: the largest distance of a point of one from the other, beside the ball.
+fn apart(terrain: &Terrain, shown: &[Shown], time: f64) -> f64 {
+    let cell = 0.01;
+    let is_column =
+        |p: &&dlsys::scene::Point| [p.x, p.z].iter().all(|x| (x / cell - (x / cell).round()).abs() < 1e-4);
+    let mut worst = 0.0_f64;
+    let mut compared = 0;
+    for point in
+        shown.iter().flat_map(|piece| &piece.vertices).filter(is_column).filter(|p| p.x.hypot(p.z) > 0.12)
+    {
+        worst = worst.max((point.y - terrain.height(time, [point.x, point.z], None).unwrap()).abs());
+        compared += 1;
+    }
+    let mesh = terrain.at(time, MaterialId::LEAF, None).unwrap();
+    for point in mesh.vertices.iter().filter(is_column).step_by(41) {
+        worst = worst.max(shown.iter().map(|piece| piece.distance(*point)).fold(f64::INFINITY, f64::min));
+    }
+    assert!(compared > 1000, "{compared} points");
+    worst
+}
+
+/// Files that play have the ground in pieces, at frames and at ticks between them within their accuracy.
+#[test]
+fn files_that_play_have_the_ground() {
+    let followed = follow(session(BALL), [0.0, 1.0, 0.05], 2);
+    let terrain = terrain(&followed.session, 1);
+    let allowed = followed.options.accuracy * followed.options.extent;
+    let bytes = followed.growth.file(Played::Glb).unwrap();
+    assert!(bytes.len() < 8_000_000, "{} bytes", bytes.len());
+    let glb = Glb::read(&bytes);
+    let usd = Usd::read(&String::from_utf8(followed.growth.file(Played::Usda).unwrap()).unwrap());
+    for tick in [0, 61, 90, 120] {
+        let time = f64::from(tick) / 120.0;
+        for all in [glb.shown(time), usd.shown(time)] {
+            let ground: Vec<Shown> = all
+                .into_iter()
+                .filter(|(name, _)| name.starts_with("ground"))
+                .map(|(_, shown)| shown)
+                .collect();
+            let worst = apart(&terrain, &ground, time);
+            assert!(worst <= allowed, "{worst} of {allowed} at {time}");
+        }
+    }
+}
+
 /// A rigid floor, and no floor, have no surface; the turtle is set down on soil as on a floor.
 #[test]
 fn a_rigid_floor_is_as_before() {
@@ -157,6 +207,23 @@ fn what_cannot_be_says_where() {
     assert!(said.contains("the rate -1 at t = ") && said.contains("0 or greater"), "{said}");
     let fine = BALL.replace("cell 0.01", "cell 0.00001").replace("extent 0.5", "extent 0.0005");
     assert!(failure(&fine, 0.0).contains("a larger `cell`"), "{}", failure(&fine, 0.0));
+}
+
+/// A stem of the default width has no thickness to press with, which is said once.
+#[test]
+fn stems_without_a_width_are_no_bodies() {
+    let post = |drawing: &str| {
+        let text = format!(
+            "soil a = sand\nground a cell 0.01 extent 0.3\nsolid Post\ninitial string: Post\ninterpret Post: {drawing}\n"
+        );
+        let session = session(&text);
+        let warnings = drawn(&session, 0.1).warnings;
+        warnings.iter().map(|warning| warning.render(&session.source, false)).collect::<Vec<_>>()
+    };
+    let said = post("F(0.1) F(0.1)");
+    assert!(said.len() == 1 && said[0].contains("a stem without a width is no body on soil"), "{said:?}");
+    assert!(said[0].contains("ground.dls:5") && said[0].contains("`!(w)`"), "{said:?}");
+    assert!(post("!(0.05) F(0.1)").is_empty());
 }
 
 /// Words that are wrong, when the model is read.

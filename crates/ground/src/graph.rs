@@ -3,6 +3,7 @@
 //! While no body moves, the neighbours that a floor can have in a direction stay the same; which of these it has depends on how high its load is. So the graph is
 //! made once after each move, and a sweep reads and writes arrays.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -29,6 +30,50 @@ pub(crate) struct Graph {
     /// What can be beside a floor, from the lowest on: those of all directions of all floors one after the other, and where each list begins.
     near: Vec<u32>,
     starts: Vec<u32>,
+}
+
+/// Columns of some tiles, with numbers in the order of tiles and indices.
+struct Columns {
+    side: usize,
+    /// For each tile, by index, the number of a column; none where it is not one of them.
+    numbers: BTreeMap<Key, Box<[u32]>>,
+}
+
+/// Stands for no column.
+const NONE: u32 = u32::MAX;
+
+impl Columns {
+    fn new(side: usize) -> Columns {
+        Columns { side, numbers: BTreeMap::new() }
+    }
+
+    fn mark(&mut self, (key, index): (Key, usize)) {
+        let count = self.side * self.side;
+        self.numbers.entry(key).or_insert_with(|| vec![NONE; count].into())[index] = 0;
+    }
+
+    /// Numbers the columns that have been marked, and returns their indices in their tiles.
+    fn number(&mut self) -> Vec<usize> {
+        let mut indices = Vec::new();
+        for numbers in self.numbers.values_mut() {
+            for (index, number) in numbers.iter_mut().enumerate().filter(|(_, number)| **number != NONE) {
+                *number = indices.len() as u32;
+                indices.push(index);
+            }
+        }
+        indices
+    }
+
+    fn get(&self, (key, index): (Key, usize)) -> Option<usize> {
+        let number = self.numbers.get(&key)?[index];
+        (number != NONE).then_some(number as usize)
+    }
+
+    /// The tiles, each with how many columns it has here.
+    fn tiles(&self) -> impl Iterator<Item = (Key, usize)> {
+        let count = |numbers: &[u32]| numbers.iter().filter(|number| **number != NONE).count();
+        self.numbers.iter().map(move |(key, numbers)| (*key, count(numbers)))
+    }
 }
 
 /// A flow from a node to another one.
@@ -146,33 +191,34 @@ impl Ground {
             return Ok(graph);
         }
         let extent = self.extent();
-        let mut places = Vec::new();
+        let mut columns = Columns::new(self.setup.settings.side);
         for &(i, k) in self.floors.keys() {
-            let near = std::iter::once((0, 0)).chain(SIDES).map(|(di, dk)| (i + di, k + dk));
-            let inside = near.filter(|(i, k)| extent.contains(*i, *k));
-            places.extend(inside.map(|(i, k)| self.setup.place(i, k)));
+            for (i, k) in std::iter::once((0, 0)).chain(SIDES).map(|(di, dk)| (i + di, k + dk)) {
+                if extent.contains(i, k) {
+                    columns.mark(self.setup.place(i, k));
+                }
+            }
         }
-        places.sort_unstable();
-        places.dedup();
-        let mut graph = Graph { indices: places.iter().map(|place| place.1).collect(), ..Graph::default() };
-        for tile in places.chunk_by(|a, b| a.0 == b.0) {
-            let (key, first) = (tile[0].0, graph.base.len());
+        let mut graph = Graph { indices: columns.number(), ..Graph::default() };
+        let mut first = 0;
+        for (key, count) in columns.tiles() {
             self.ensure(key)?;
             let roofs = self.roofs.get(&key);
             let stored = self.tiles.get(&key);
-            for (_, index) in tile {
+            for index in &graph.indices[first..first + count] {
                 graph.base.push(stored.map_or(0, |tile| tile.base(*index)));
                 graph.ceiling.push(roofs.map_or(i64::MAX, |roofs| roofs[*index]));
-                graph.owner.push(None);
             }
-            graph.tiles.push((key, first..first + tile.len()));
+            graph.tiles.push((key, first..first + count));
+            first += count;
         }
+        graph.owner = vec![None; first];
         let number = |(i, k): (i32, i32)| {
-            let inside = extent.contains(i, k).then(|| places.binary_search(&self.setup.place(i, k)));
-            inside.and_then(Result::ok)
+            let inside = extent.contains(i, k).then(|| columns.get(self.setup.place(i, k)));
+            inside.flatten()
         };
         // The floors over each column.
-        let mut over = vec![0..0; places.len()];
+        let mut over = vec![0..0; first];
         for (column, floors) in self.floors.iter() {
             let first = graph.base.len();
             graph.base.extend(floors.iter().map(|floor| floor.base));
@@ -182,7 +228,8 @@ impl Ground {
                 over[number] = first..graph.base.len();
             }
         }
-        let mut node = places.len();
+        let mut node = first;
+        let mut open: Vec<u32> = Vec::new();
         for (&(i, k), floors) in self.floors.iter() {
             let beside = SIDES.map(|(di, dk)| number((i + di, k + dk)));
             for _ in floors {
@@ -191,9 +238,9 @@ impl Ground {
                     let Some(number) = number else { continue };
                     let first = graph.near.len();
                     let all = std::iter::once(number).chain(over[number].clone());
-                    let open = all.filter(|other| graph.is_open(node, *other));
-                    let open: Vec<_> = open.map(|other| other as u32).collect();
-                    graph.near.extend(open);
+                    open.clear();
+                    open.extend(all.filter(|other| graph.is_open(node, *other)).map(|other| other as u32));
+                    graph.near.extend(&open);
                     let base = &graph.base;
                     graph.near[first..].sort_by_key(|other| base[*other as usize]);
                 }

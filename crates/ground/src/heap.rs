@@ -1,6 +1,7 @@
-//! Material that lies on bodies, as triangles: a sheet over each body's floors that thins out towards its rim, with walls down to the body.
+//! Material that lies on bodies, as triangles: a sheet over each body's floors that thins out over bare ones and ends where it is a film, with walls down
+//! to the body at its edges.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use crate::load::Floor;
 use crate::tile::QUANTA;
@@ -10,13 +11,45 @@ use crate::{Ground, Mesh, Vector};
 const STEP: i64 = 3 << 32;
 /// Parts of a cell by which offsets are counted.
 const LATTICE: f64 = 65_536.0;
+/// Thickness from which on material is drawn, in quanta: a fiftieth of a cell.
+const FILM: f64 = 0.02 * QUANTA;
 /// Columns around a corner, from the column before it along both axes.
 const AROUND: [(i32, i32); 4] = [(0, 0), (1, 0), (1, 1), (0, 1)];
 
-/// A corner between four columns: its place in m on top of what lies there, and on the body.
+/// A corner between four columns: its place in m on top of what lies there and on the body, and the thickness between them in quanta.
+#[derive(Clone, Copy)]
 struct Corner {
     top: Vector,
     bottom: Vector,
+    thickness: f64,
+}
+
+impl Corner {
+    fn is_drawn(&self) -> bool {
+        self.thickness >= FILM
+    }
+
+    /// The place between a corner that is drawn and one that is not at which the film begins.
+    fn rim(a: &Corner, b: &Corner) -> Corner {
+        let (thin, thick) = if a.is_drawn() { (b, a) } else { (a, b) };
+        let part = (FILM - thin.thickness) / (thick.thickness - thin.thickness);
+        let between = |from: Vector, to: Vector| from + (to - from) * part;
+        Corner {
+            top: between(thin.top, thick.top),
+            bottom: between(thin.bottom, thick.bottom),
+            thickness: FILM,
+        }
+    }
+
+    /// The parts of a line from corner to corner that are drawn.
+    fn drawn(from: &Corner, to: &Corner) -> Option<[Corner; 2]> {
+        match (from.is_drawn(), to.is_drawn()) {
+            (true, true) => Some([*from, *to]),
+            (true, false) => Some([*from, Corner::rim(from, to)]),
+            (false, true) => Some([Corner::rim(from, to), *to]),
+            (false, false) => None,
+        }
+    }
 }
 
 impl Ground {
@@ -30,22 +63,35 @@ impl Ground {
                 mesh.points.len() as u32 - 1
             })
         };
-        for (&(i, k), floors) in self.floors.iter() {
-            for floor in floors.iter().filter(|floor| floor.load > 0) {
+        let loaded = self.floors.iter().filter(|(_, floors)| floors.iter().any(|floor| floor.load > 0));
+        let around =
+            |(i, k): (i32, i32)| (-1..=1).flat_map(move |di| (-1..=1).map(move |dk| (i + di, k + dk)));
+        let near: BTreeSet<(i32, i32)> = loaded.flat_map(|(column, _)| around(*column)).collect();
+        for (i, k) in near {
+            for floor in self.floors.get(&(i, k)).into_iter().flatten() {
                 // Counterclockwise from above: x to the right, z towards the viewer.
                 let corners = [(i - 1, k - 1), (i - 1, k), (i, k), (i, k - 1)];
                 let corners = corners.map(|first| self.corner(floor, first));
-                let top = [0, 1, 2, 3].map(|n| number(&mut mesh, corners[n].top));
-                mesh.triangles.extend([[top[0], top[1], top[2]], [top[0], top[2], top[3]]]);
+                let sides = [0, 1, 2, 3].map(|n| Corner::drawn(&corners[n], &corners[(n + 1) % 4]));
+                let mut outline: Vec<u32> = Vec::new();
+                for end in sides.iter().flatten().flatten() {
+                    let end = number(&mut mesh, end.top);
+                    if outline.last() != Some(&end) {
+                        outline.push(end);
+                    }
+                }
+                for n in 2..outline.len() {
+                    mesh.triangles.push([outline[0], outline[n - 1], outline[n]]);
+                }
                 // Beyond each of the edges that begin at these corners.
                 let beyond = [(i - 1, k), (i, k + 1), (i + 1, k), (i, k - 1)];
-                for (n, column) in beyond.into_iter().enumerate() {
-                    if self.beside(floor, column).is_some_and(|other| other.load > 0) {
+                for (side, column) in sides.iter().zip(beyond) {
+                    let Some([from, to]) = side.filter(|_| self.beside(floor, column).is_none()) else {
                         continue;
-                    }
-                    let (from, to) = (n, (n + 1) % 4);
-                    let feet = [from, to].map(|n| number(&mut mesh, corners[n].bottom));
-                    mesh.triangles.extend([[top[from], feet[0], feet[1]], [top[from], feet[1], top[to]]]);
+                    };
+                    let [a, b, c, d] =
+                        [from.top, from.bottom, to.bottom, to.top].map(|at| number(&mut mesh, at));
+                    mesh.triangles.extend([[a, b, c], [a, c, d]]);
                 }
             }
         }
@@ -86,7 +132,8 @@ impl Ground {
             )
         };
         // Towards the rim, where floors are missing or bare, it thins out.
-        Corner { top: at(base + load as f64 / 4.0), bottom: at(base) }
+        let thickness = load as f64 / 4.0;
+        Corner { top: at(base + thickness), bottom: at(base), thickness }
     }
 }
 

@@ -8,7 +8,7 @@
 //! - [`Ground`]: the columns at an instant; a value, whose clones share what has not changed. [`Ground::advance`] makes the next tick.
 //! - [`Pour`]: material that is added, on a disc or everywhere.
 //! - [`Body`]: a closed mesh that presses, pushes and carries, or a shelf that only carries.
-//! - [`Mesh`]: the surface as triangles.
+//! - [`Mesh`]: the surface as triangles; [`Piece`]: a part of it whose triangles stay the same at all times.
 //! - [`study`]: exact cases with their errors and orders.
 //!
 //! All values are in SI units; y is up. The crate knows nothing of turtles and productions.
@@ -67,18 +67,23 @@
 #![warn(missing_docs)]
 
 mod clock;
+mod contour;
+mod cover;
 mod error;
 mod graph;
 mod ground;
+mod heading;
 mod heap;
 mod kernel;
 mod load;
 mod material;
 mod mesh;
 mod noise;
+mod pattern;
 mod pour;
 mod press;
 mod relief;
+mod setup;
 mod slip;
 mod spans;
 pub mod study;
@@ -89,6 +94,7 @@ pub use error::Error;
 pub use ground::{Description, Ground, Settings};
 pub use material::Soil;
 pub use mesh::Mesh;
+pub use pattern::Piece;
 pub use pour::{Place, Pour};
 pub use press::Body;
 pub use relief::Relief;

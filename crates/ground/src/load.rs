@@ -104,6 +104,15 @@ impl Ground {
         self.graph = None;
         let mut taken = Vec::new();
         let floors = Arc::make_mut(&mut self.floors);
+        if floors.values().flatten().all(|floor| floor.body == body) {
+            // No other body has floors.
+            let all = std::mem::take(floors).into_iter();
+            let all = all.flat_map(|(column, floors)| floors.into_iter().map(move |floor| (column, floor)));
+            taken = all.filter(|(_, floor)| floor.load > 0).collect();
+            // In the order of the columns of spans, as below.
+            taken.sort_by_key(|((i, k), _)| (*k, *i));
+            return taken;
+        }
         for column in &foot.floors {
             let Some(all) = floors.get_mut(column) else { continue };
             all.retain(|floor| {
@@ -123,6 +132,13 @@ impl Ground {
     pub(crate) fn add_floors(&mut self, new: impl Iterator<Item = ((i32, i32), Floor)>) {
         self.graph = None;
         let floors = Arc::make_mut(&mut self.floors);
+        if floors.is_empty() {
+            let mut all: Vec<_> = new.collect();
+            all.sort_unstable_by_key(|(column, floor)| (*column, floor.base, floor.body));
+            let columns = all.chunk_by(|a, b| a.0 == b.0);
+            *floors = columns.map(|all| (all[0].0, all.iter().map(|(_, floor)| *floor).collect())).collect();
+            return;
+        }
         for (column, floor) in new {
             let all = floors.entry(column).or_default();
             let at = all.partition_point(|other| (other.base, other.body) < (floor.base, floor.body));

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::PoisonError;
 
 use crate::tile::{Key, QUANTA};
-use crate::{Ground, Vector};
+use crate::{Ground, Piece, Vector};
 
 /// A surface of triangles.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -27,9 +27,11 @@ const TOUCHING: i64 = 1 << 30;
 const AROUND: [(i32, i32); 8] = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
 
 /// A mesh in the making.
-struct Weaver<'a> {
+pub(crate) struct Weaver<'a> {
     ground: &'a Ground,
     mesh: Mesh,
+    /// The columns of its points, and their numbers.
+    columns: Vec<(i32, i32)>,
     numbers: HashMap<(i32, i32), u32>,
 }
 
@@ -37,21 +39,16 @@ impl Ground {
     /// The surface, from the first to the last column along each axis.
     pub fn mesh(&self) -> Mesh {
         let squares = self.squares();
-        let mut weaver = Weaver { ground: self, mesh: Mesh::default(), numbers: HashMap::new() };
+        let mut weaver = Weaver::new(self);
         for (key, size) in &squares {
-            let [x, z] = self.corners(*key);
-            for k in (z[0]..z[1]).step_by(*size as usize) {
-                for i in (x[0]..x[1]).step_by(*size as usize) {
-                    weaver.square((i, k), *size, |(i, k)| self.size_beside(&squares, *key, *size, (i, k)));
-                }
-            }
+            weaver.tile(&squares, *key, *size);
         }
         weaver.mesh
     }
 
     /// The height at which a column is drawn: under a body that presses on it, up to the ground beside the body, so that the surface closes with the
     /// body. The difference is within the body.
-    fn shown(&self, i: i32, k: i32) -> i64 {
+    pub(crate) fn shown(&self, i: i32, k: i32) -> i64 {
         let top = self.top(i, k);
         let (i, k) = self.extent().mirrored(i, k);
         let roof = self.roof((i, k));
@@ -73,7 +70,7 @@ impl Ground {
     }
 
     /// The size of the squares of each tile.
-    fn squares(&self) -> BTreeMap<Key, i32> {
+    pub(crate) fn squares(&self) -> BTreeMap<Key, i32> {
         let (side, extent) = (self.setup.side, self.extent());
         let tiles = |[from, to]: [i32; 2]| from.div_euclid(side)..=(to - 1).max(from).div_euclid(side);
         let keys = tiles(extent.x).flat_map(|p| tiles(extent.z).map(move |q| (p, q)));
@@ -131,13 +128,34 @@ impl Ground {
     }
 }
 
-impl Weaver<'_> {
+impl<'a> Weaver<'a> {
+    pub fn new(ground: &'a Ground) -> Weaver<'a> {
+        Weaver { ground, mesh: Mesh::default(), columns: Vec::new(), numbers: HashMap::new() }
+    }
+
+    /// The squares of a tile.
+    pub fn tile(&mut self, squares: &BTreeMap<Key, i32>, key: Key, size: i32) {
+        let ground = self.ground;
+        let [x, z] = ground.corners(key);
+        for k in (z[0]..z[1]).step_by(size as usize) {
+            for i in (x[0]..x[1]).step_by(size as usize) {
+                self.square((i, k), size, |(i, k)| ground.size_beside(squares, key, size, (i, k)));
+            }
+        }
+    }
+
+    /// What has been woven, without the heights.
+    pub fn piece(self) -> Piece {
+        Piece { columns: self.columns, triangles: self.mesh.triangles }
+    }
+
     /// The number of the point of a column.
     fn point(&mut self, (i, k): (i32, i32)) -> u32 {
-        let (ground, points) = (self.ground, &mut self.mesh.points);
+        let (ground, points, columns) = (self.ground, &mut self.mesh.points, &mut self.columns);
         *self.numbers.entry((i, k)).or_insert_with(|| {
             let cell = ground.cell();
             let height = ground.shown(i, k) as f64 / QUANTA * cell;
+            columns.push((i, k));
             points.push(Vector::new(f64::from(i) * cell, height, f64::from(k) * cell));
             points.len() as u32 - 1
         })

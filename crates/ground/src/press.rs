@@ -2,11 +2,15 @@
 //!
 //! The rules of Sumner, O'Brien, Hodgins (*Animating Sand, Mud, and Snow*, 1999, section 3.2) and of Onoue, Nishita (*Virtual Sandbox*, 2003,
 //! section 3.3.2) in one: a column that a body enters is lowered to the body. A body that sinks compresses a part and presses the rest outward, along
-//! falling distance from the rim; one that moves sideways pushes all of it, to columns ahead. What comes to lie under the body is moved on.
+//! falling distance from the rim; one that moves sideways pushes all of it, to columns ahead. What comes to lie under the body is moved on. Which of the two a body does is
+//! decided where it touches the material: a wheel that rolls sinks in, whatever its axle does.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use crate::contour::Contours;
+use crate::cover::{Foot, reach_of};
+use crate::heading::{Heading, Motions, Total};
 use crate::load::{Floor, Parcel};
 use crate::spans::{Place, Span, carried, join, of_mesh, of_surface, of_way};
 use crate::tile::QUANTA;
@@ -29,32 +33,6 @@ pub struct Body {
     pub shelf: bool,
 }
 
-/// What a body covers: the lowest underside over each column, in quanta.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Foot {
-    places: Vec<Place>,
-    undersides: BTreeMap<(i32, i32), i64>,
-    /// First and last column with an underside along x and z.
-    reach: Option<[[i32; 2]; 2]>,
-    /// Columns with floors of the body.
-    pub floors: Vec<(i32, i32)>,
-    /// Whether its spans were computed: they are not where a body can neither press nor carry anything.
-    spanned: bool,
-}
-
-/// The box around columns.
-fn reach_of<'a>(columns: impl Iterator<Item = &'a (i32, i32)>) -> Option<[[i32; 2]; 2]> {
-    columns.fold(None, |reach, &(i, k)| {
-        let [x, z] = reach.unwrap_or([[i; 2], [k; 2]]);
-        Some([[x[0].min(i), x[1].max(i)], [z[0].min(k), z[1].max(k)]])
-    })
-}
-
-fn meet(a: Option<[[i32; 2]; 2]>, b: Option<[[i32; 2]; 2]>) -> bool {
-    let along = |a: [i32; 2], b: [i32; 2]| a[0] <= b[1] && b[0] <= a[1];
-    a.zip(b).is_some_and(|(a, b)| along(a[0], b[0]) && along(a[1], b[1]))
-}
-
 /// Material that reaches into a body by less than this counts as touching it, in quanta; a millionth of a cell.
 const SKIN: i64 = 4096;
 /// Distance above the surface from which on bodies are looked at, in quanta.
@@ -63,7 +41,8 @@ const NEAR: i64 = 8 << 32;
 const PARTS: i64 = 1 << 16;
 
 /// Columns around one.
-const AROUND: [(i32, i32); 8] = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+pub(crate) const AROUND: [(i32, i32); 8] =
+    [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
 
 impl Body {
     /// A body that stands still.
@@ -99,28 +78,23 @@ impl Body {
     }
 }
 
-/// A direction in plan, as integers, and whether a body sinks more than it moves along it.
-#[derive(Clone, Copy, Debug)]
-struct Heading {
-    x: i64,
-    z: i64,
-    sinks: bool,
-}
-
 impl Ground {
     /// Moves a body to a part of its way in the tick.
     pub(crate) fn move_body(&mut self, body: &Body, part: f64) -> Result<(), Error> {
         let cell = self.cell();
-        let places = body.places(part, cell)?;
+        let places: Arc<[Place]> = body.places(part, cell)?.into();
         let before = self.feet.get(&body.id).cloned();
         if before.as_ref().is_some_and(|foot| foot.places == places && (foot.spanned || !self.poured_on)) {
             return Ok(());
         }
         let mut foot = Foot { places, ..Foot::default() };
         let (mut spans, mut way) = (Vec::new(), Vec::new());
-        let near = |foot: &Foot| self.is_near(&foot.places);
-        foot.spanned =
-            self.poured_on || near(&foot) || before.as_deref().is_some_and(near) || self.carries(body.id);
+        // The highest ground under the body before and after.
+        let ends = [Some(&foot), before.as_deref()]
+            .map(|foot| foot.map(|foot| (foot, self.highest_under(&foot.places))));
+        let highest = ends.iter().flatten().map(|(_, highest)| *highest).fold(i64::MIN, i64::max);
+        let is_near = ends.into_iter().flatten().any(|(foot, highest)| foot.comes_below(highest + NEAR));
+        foot.spanned = is_near || self.poured_on || self.carries(body.id);
         if foot.spanned {
             if body.shelf {
                 // Under the ground it is not there.
@@ -128,27 +102,26 @@ impl Ground {
                 spans.retain(|span| span.top >= self.top(span.column.0, span.column.1));
             } else {
                 spans = of_mesh(&body.name, &foot.places, &body.triangles, cell)?;
-                for span in spans.iter().rev() {
-                    foot.undersides.insert(span.column, span.bottom);
-                }
+                foot.undersides = spans.iter().map(|span| (span.column, span.bottom)).collect();
+                foot.undersides.dedup_by_key(|(column, _)| *column);
                 way = spans.clone();
                 let passed = before.as_ref().filter(|before| before.places.len() == foot.places.len());
                 if let Some(before) = passed {
-                    way.extend(of_way(&before.places, &foot.places, &body.triangles));
+                    way.extend(of_way(&before.places, &foot.places, &body.triangles, highest));
                     join(&mut way);
                 }
             }
         }
-        foot.reach = reach_of(foot.undersides.keys());
+        foot.reach = reach_of(&foot.undersides);
         foot.floors = spans.iter().map(|span| span.column).collect();
         foot.floors.dedup();
         self.check_inside(body, &way)?;
-        let heading = heading(before.as_deref(), &foot);
+        let motions = Motions::new(body, before.as_deref(), &foot);
         let parcels = self.take_loads(body, before.as_deref(), &foot);
         self.cover(body.id, before.as_deref(), Some(foot))?;
         self.add_floors(floors(body.id, &spans));
         self.stirred |= !spans.is_empty() || !parcels.is_empty();
-        self.displace(body.id, &way, heading)?;
+        self.displace(body.id, &way, &motions)?;
         for parcel in parcels {
             self.put(body.id, parcel)?;
         }
@@ -186,16 +159,15 @@ impl Ground {
         Ok(())
     }
 
-    /// Whether the lowest point of a body is near the surface under it.
-    fn is_near(&self, places: &[Place]) -> bool {
+    /// A height that no column under a body exceeds, in quanta.
+    fn highest_under(&self, places: &[Place]) -> i64 {
         let over = |get: fn(&Place) -> i64| {
             let all = || places.iter().map(get);
             [all().min().unwrap_or(0) as f64, all().max().unwrap_or(0) as f64]
         };
         let scale = self.cell() / 65_536.0;
         let [_, high] = self.bounds(over(|at| at.x).map(|x| x * scale), over(|at| at.z).map(|z| z * scale));
-        let [low, _] = over(|at| at.y);
-        low < high / self.cell() * QUANTA + NEAR as f64
+        (high / self.cell() * QUANTA).ceil() as i64
     }
 
     fn check_inside(&self, body: &Body, way: &[Span]) -> Result<(), Error> {
@@ -209,73 +181,11 @@ impl Ground {
         })
     }
 
-    /// Puts a body's new undersides in the place of the old ones, and wakes the columns that this concerns.
-    fn cover(&mut self, id: u64, before: Option<&Foot>, after: Option<Foot>) -> Result<(), Error> {
-        let mut columns: BTreeSet<(i32, i32)> = BTreeSet::new();
-        let mut lowest: BTreeMap<(i32, i32), i64> = BTreeMap::new();
-        for foot in [before, after.as_ref()].into_iter().flatten() {
-            for (column, underside) in &foot.undersides {
-                columns.insert(*column);
-                let low = lowest.entry(*column).or_insert(*underside);
-                *low = (*low).min(*underside);
-            }
-        }
-        let feet = Arc::make_mut(&mut self.feet);
-        match after {
-            Some(foot) => feet.insert(id, Arc::new(foot)),
-            None => feet.remove(&id),
-        };
-        let reach = reach_of(columns.iter());
-        let near: Vec<_> = self.feet.values().filter(|foot| meet(foot.reach, reach)).cloned().collect();
-        for &(i, k) in &columns {
-            if !self.extent().contains(i, k) {
-                continue;
-            }
-            let all = near.iter().filter_map(|foot| foot.undersides.get(&(i, k)));
-            let roof = all.copied().min().unwrap_or(i64::MAX);
-            self.set_roof((i, k), roof);
-        }
-        let mut keys: Vec<_> = columns.iter().map(|(i, k)| self.setup.place(*i, *k).0).collect();
-        keys.sort_unstable();
-        keys.dedup();
-        let roofs = Arc::make_mut(&mut self.roofs);
-        for key in keys {
-            if roofs.get(&key).is_some_and(|tile| tile.iter().all(|roof| *roof == i64::MAX)) {
-                roofs.remove(&key);
-            }
-        }
-        // Columns under a body that touches them, or did, and those around it.
-        let touched = lowest.into_iter().filter(|((i, k), underside)| {
-            self.extent().contains(*i, *k) && underside - (1 << 32) <= self.top(*i, *k)
-        });
-        let around = touched
-            .flat_map(|((i, k), _)| std::iter::once((i, k)).chain(AROUND.map(|(di, dk)| (i + di, k + dk))));
-        let around = around.collect();
-        self.wake_all(around)
-    }
-
-    fn set_roof(&mut self, (i, k): (i32, i32), roof: i64) {
-        self.graph = None;
-        let (key, index) = self.setup.place(i, k);
-        let count = self.setup.settings.side * self.setup.settings.side;
-        let roofs = Arc::make_mut(&mut self.roofs);
-        if roof == i64::MAX && !roofs.contains_key(&key) {
-            return;
-        }
-        let tile = roofs.entry(key).or_insert_with(|| vec![i64::MAX; count].into());
-        Arc::make_mut(tile)[index] = roof;
-    }
-
-    /// Height of what is above a column, in quanta.
-    pub(crate) fn roof(&self, (i, k): (i32, i32)) -> i64 {
-        let (key, index) = self.setup.place(i, k);
-        self.roofs.get(&key).map_or(i64::MAX, |roofs| roofs[index])
-    }
-
     /// Removes what a body has passed, and puts it around the body. What is above it comes to lie on it.
-    fn displace(&mut self, body: u64, way: &[Span], heading: Heading) -> Result<(), Error> {
+    fn displace(&mut self, body: u64, way: &[Span], motions: &Motions) -> Result<(), Error> {
         let mut moved: BTreeMap<(i32, i32), i64> = BTreeMap::new();
-        let push = if heading.sinks { (self.soil().push * PARTS as f64).round() as i64 } else { PARTS };
+        let sunk = (self.soil().push * PARTS as f64).round() as i64;
+        let mut total = Total::default();
         let extent = self.extent();
         for spans in way.chunk_by(|a, b| a.column == b.column) {
             let (column, bottom) = (spans[0].column, spans[0].bottom);
@@ -295,11 +205,15 @@ impl Ground {
                 volume -= part;
                 *moved.entry(column).or_insert(0) += self.lay(body, column, span.top, part)?;
             }
+            let motion = motions.of(spans[0].sole);
+            total.add(motion, volume);
+            let push = if Heading::of(motion).sinks { sunk } else { PARTS };
             let pushed = (i128::from(volume) * i128::from(push) / i128::from(PARTS)) as i64;
             self.pack(column, volume - pushed)?;
             *moved.entry(column).or_insert(0) += pushed;
         }
         moved.retain(|_, volume| *volume > 0);
+        let heading = Heading::of(total.mean());
         // Each round, columns that were filled up to the body join those that material has to leave.
         let mut full: BTreeSet<(i32, i32)> = BTreeSet::new();
         while !moved.is_empty() {
@@ -366,18 +280,16 @@ impl Ground {
         full: &BTreeSet<(i32, i32)>,
         heading: Heading,
     ) -> Result<BTreeSet<(i32, i32)>, Error> {
-        let (contours, mut landed) = (self.contours(full), BTreeSet::new());
-        let mut order: Vec<((i32, i32), u32)> =
-            contours.iter().map(|(column, ring)| (*column, *ring)).collect();
-        order.sort_unstable_by_key(|(column, ring)| (std::cmp::Reverse(*ring), *column));
-        for (column, ring) in order {
+        let (contours, mut landed) = (Contours::of(full, self.extent()), BTreeSet::new());
+        for (column, ring) in contours.inward_first() {
             let Some(volume) = moved.remove(&column) else { continue };
             let lower = |(di, dk): &(i32, i32)| {
                 let to = (column.0 + di, column.1 + dk);
-                let outward = contours.get(&to).is_none_or(|other| *other < ring);
+                let outward = contours.ring(to).is_none_or(|other| other < ring);
                 outward && self.extent().contains(to.0, to.1)
             };
-            let ahead = |(di, dk): &(i32, i32)| heading.x * i64::from(*di) + heading.z * i64::from(*dk) >= 0;
+            let ahead =
+                |(di, dk): &(i32, i32)| heading.x * i128::from(*di) + heading.z * i128::from(*dk) >= 0;
             let mut targets: Vec<_> = AROUND.into_iter().filter(lower).collect();
             if !heading.sinks && targets.iter().any(ahead) {
                 targets.retain(ahead);
@@ -388,7 +300,7 @@ impl Ground {
             self.pack(column, volume - share * count)?;
             for (di, dk) in targets {
                 let to = (column.0 + di, column.1 + dk);
-                if contours.contains_key(&to) {
+                if contours.ring(to).is_some() {
                     *moved.entry(to).or_insert(0) += share;
                 } else {
                     self.wake(to.0, to.1)?;
@@ -404,25 +316,6 @@ impl Ground {
         }
         Ok(landed)
     }
-
-    /// Distance of full columns from those that are not, in rings.
-    fn contours(&self, full: &BTreeSet<(i32, i32)>) -> BTreeMap<(i32, i32), u32> {
-        let mut rings: BTreeMap<(i32, i32), u32> = BTreeMap::new();
-        let near = |(i, k): (i32, i32)| AROUND.map(|(di, dk)| (i + di, k + dk));
-        let free = |at: &(i32, i32)| !full.contains(at) && self.extent().contains(at.0, at.1);
-        let mut ring: Vec<_> = full.iter().copied().filter(|at| near(*at).iter().any(free)).collect();
-        let mut number = 1;
-        while !ring.is_empty() {
-            rings.extend(ring.iter().map(|at| (*at, number)));
-            number += 1;
-            let next = ring.iter().flat_map(|at| near(*at));
-            let mut next: Vec<_> = next.filter(|at| full.contains(at) && !rings.contains_key(at)).collect();
-            next.sort_unstable();
-            next.dedup();
-            ring = next;
-        }
-        rings
-    }
 }
 
 /// The floors on spans, which are in order.
@@ -433,21 +326,4 @@ fn floors(body: u64, spans: &[Span]) -> impl Iterator<Item = ((i32, i32), Floor)
         let floor = Floor { body, triangle: span.lid, base: span.top, load: 0, ceiling, offset: [0; 2] };
         (span.column, floor)
     })
-}
-
-/// The direction in which a body has moved.
-fn heading(before: Option<&Foot>, after: &Foot) -> Heading {
-    let Some(before) = before.filter(|before| before.places.len() == after.places.len()) else {
-        return Heading { x: 0, z: 0, sinks: true };
-    };
-    let (mut x, mut y, mut z) = (0_i128, 0_i128, 0_i128);
-    for (from, to) in before.places.iter().zip(&after.places) {
-        x += i128::from(to.x - from.x);
-        y += i128::from(to.y - from.y) >> 16;
-        z += i128::from(to.z - from.z);
-    }
-    let count = before.places.len().max(1) as i128;
-    let (x, y, z) = ((x / count) as i64, (y / count) as i64, (z / count) as i64);
-    let level = (x as f64).hypot(z as f64);
-    Heading { x, z, sinks: level <= -(y as f64) || (x == 0 && z == 0) }
 }

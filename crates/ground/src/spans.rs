@@ -57,7 +57,8 @@ pub(crate) struct Span {
     pub column: (i32, i32),
     pub bottom: i64,
     pub top: i64,
-    /// The triangle at the top.
+    /// The triangles at the bottom and at the top.
+    pub sole: u32,
     pub lid: u32,
 }
 
@@ -115,14 +116,14 @@ impl Scan {
         for column in self.hits.chunk_by(|a, b| a.0 == b.0) {
             let (k, i) = column[0].0;
             // Inside is where the line has entered and left unequally often: meshes that are inside out have an inside, too.
-            let (mut depth, mut bottom) = (0, 0);
-            for &(_, height, side, lid) in column {
+            let (mut depth, mut bottom, mut sole) = (0, 0, 0);
+            for &(_, height, side, triangle) in column {
                 if depth == 0 {
-                    bottom = height;
+                    (bottom, sole) = (height, triangle);
                 }
                 depth += side;
                 if depth == 0 {
-                    spans.push(Span { column: (i, k), bottom, top: height, lid });
+                    spans.push(Span { column: (i, k), bottom, top: height, sole, lid: triangle });
                 }
             }
             if depth != 0 {
@@ -187,19 +188,25 @@ pub(crate) fn of_surface(places: &[Place], triangles: &[[u32; 3]]) -> Vec<Span> 
         scan.triangle(number, triangle.map(|n| places[n as usize]));
     }
     scan.hits.sort_unstable();
-    let span = |&((k, i), height, _, lid): &Hit| Span { column: (i, k), bottom: height, top: height, lid };
+    let span = |&((k, i), height, _, triangle): &Hit| Span {
+        column: (i, k),
+        bottom: height,
+        top: height,
+        sole: triangle,
+        lid: triangle,
+    };
     let mut spans: Vec<_> = scan.hits.iter().map(span).collect();
     join(&mut spans);
     spans
 }
 
-/// The spans of what a mesh passes on its way between two places, without those at its ends.
-pub(crate) fn of_way(from: &[Place], to: &[Place], triangles: &[[u32; 3]]) -> Vec<Span> {
+/// The spans of what a mesh passes on its way between two places, without those at its ends; only triangles that come below a height count.
+pub(crate) fn of_way(from: &[Place], to: &[Place], triangles: &[[u32; 3]], highest: i64) -> Vec<Span> {
     let (mut scan, mut spans) = (Scan::default(), Vec::new());
     for (number, triangle) in triangles.iter().enumerate() {
         let [a, b, c] = triangle.map(|n| n as usize);
         let ends = [from[a], from[b], from[c], to[a], to[b], to[c]];
-        if !Place::has_column(&ends) {
+        if ends.iter().all(|place| place.y > highest) || !Place::has_column(&ends) {
             continue;
         }
         scan.triangle(number, [from[a], from[b], from[c]]);

@@ -74,6 +74,42 @@ fn a_thin_plate_pushes_all_that_it_passes_in_one_tick() -> Outcome {
     Ok(())
 }
 
+/// A ball in sand that stands at any slope, moved by 0.3 m in parts of a tick each, turning or not: what lies in its way at the end, and how deep its
+/// track is behind it.
+fn track(turns: bool) -> Result<[f64; 2], Error> {
+    let (radius, sunk) = (0.2, 0.04);
+    let mut ground = level(Soil { push: 0.3, ..Soil::snow() }, 0.2)?;
+    let (points, triangles) = sphere(Vector::zeros(), radius, 32);
+    let at = |x: f64| {
+        let turn = if turns { -x / radius } else { 0.0 };
+        placed(
+            &points,
+            &Rotation3::from_axis_angle(&Vector::z_axis(), turn),
+            Vector::new(x, 0.2 + radius - sunk, 0.0),
+        )
+    };
+    for tick in 0..60 {
+        let [from, to] = [tick, tick + 1].map(|tick| at(f64::from(tick) * 0.005));
+        ground.advance(&[], &[body(&triangles, from, to)])?;
+    }
+    assert_eq!(ground.imbalance(), 0);
+    let ahead: f64 = (30..60)
+        .flat_map(|i| (-20..=20).map(move |k| (i, k)))
+        .map(|(i, k)| (ground.column(i, k) - 0.2).max(0.0))
+        .sum();
+    Ok([ahead * CELL * CELL, 0.2 - ground.column(10, 0)])
+}
+
+/// A ball that rolls without slipping stands still where it touches the ground: it presses its track, and has no wave before it, as one has that is dragged.
+#[test]
+fn what_rolls_presses_and_does_not_push() -> Outcome {
+    let ([rolled, deep], [dragged, _]) = (track(true)?, track(false)?);
+    // A track of the depth of the ball holds 6 litres or so; less than a tenth of them is ahead.
+    assert!(rolled < 0.0006 && dragged > 3.0 * rolled, "{rolled} {dragged}");
+    assert!((deep - 0.04).abs() < 0.006, "{deep}");
+    Ok(())
+}
+
 #[test]
 fn what_is_lifted_moves_nothing() -> Outcome {
     for lean in [0.0, 0.3] {

@@ -11,7 +11,7 @@
 //!
 //! The accuracy bounds the distance of every point of the file from that of the model, at frames and between them. Its parts: triangles in place of curved
 //! surfaces 0.36 (an estimate); of frames, what happens between samples 0.18, tracks 0.13; of shapes, differences of modules that share a life, samples included, 0.25, what is between
-//! two ages 0.08.
+//! two ages 0.08 (of sheets and ground, which are triangles, 0.4).
 //! Stems end in half balls, also where they meet, in place of the joints of OBJ meshes.
 //!
 //! ```
@@ -40,6 +40,7 @@ mod mesh;
 mod motion;
 mod part;
 mod sample;
+mod soil;
 mod stem;
 mod thin;
 mod track;
@@ -203,7 +204,7 @@ pub fn grow(
         return Err(Error::TooLong { seconds, limit: Options::LONGEST });
     }
     let settings = Settings { log: true, ..settings };
-    let nursery = Nursery::new(model, settings).without_gases().without_ground();
+    let nursery = Nursery::new(model, settings).without_gases().with_ground_in_pieces();
     let mut blank = nursery.blank();
     blank.notes_poses = true;
     let tolerance = options.tolerance();
@@ -212,9 +213,10 @@ pub fn grow(
     let longest = if sways(model) { SWAY / model.scenery.units.time } else { f64::INFINITY };
     let longest = longest.min(((last - first) / INTERVALS).max(f64::MIN_POSITIVE));
     let instant = INSTANT / options.seconds;
+    let sampler = Sampler { default_width: options.default_width, metres: options.metres };
     let mut follower = Follower {
         nursery: &nursery,
-        sampler: Sampler { default_width: options.default_width, metres: options.metres },
+        sampler,
         closeness: Closeness { straight: 0.15 * tolerance, thin: 0.03 * tolerance, instant, longest },
         limits: options.limits,
         threads: options.threads,
@@ -225,12 +227,14 @@ pub fn grow(
         falls: dlsys_geometry::turtle::lets_go(model),
     };
     follower.follow(times, progress)?;
-    let tracks = follower.tracks;
+    let mut tracks = follower.tracks;
+    soil::follow(&nursery, (sampler, 0.1 * tolerance), times, options.limits, &mut tracks, progress)?;
     let gases = match options.gases && dlsys_geometry::turtle::lets_out(model) {
         true => gases::follow(session, settings, times, options, progress)?,
         false => Vec::new(),
     };
-    let allowed = Tolerance { likeness: 0.25 * tolerance, mix: 0.08 * tolerance };
+    let allowed =
+        Tolerance { likeness: 0.25 * tolerance, mix: 0.08 * tolerance, mix_of_nets: 0.4 * tolerance };
     let lives = life::lives(&tracks.phases, allowed, 2.0 * instant);
     Ok(Growth {
         title: model.title.clone().unwrap_or_else(|| session.source.name.clone()),

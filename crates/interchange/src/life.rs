@@ -54,6 +54,8 @@ pub(crate) struct Tolerance {
     pub(crate) likeness: f64,
     /// Of a shape from what its weights make.
     pub(crate) mix: f64,
+    /// The same where triangles stand for themselves, not for curved surfaces.
+    pub(crate) mix_of_nets: f64,
 }
 
 impl Phase {
@@ -127,7 +129,11 @@ pub(crate) fn lives(phases: &[Phase], tolerance: Tolerance, slack: f64) -> Lives
             models.len() - 1
         });
     }
-    let lives = models.into_iter().map(|(i, ages)| life(i, &phases[i], &ages, tolerance.mix)).collect();
+    let mix = |phase: &Phase| match phase.form.iter().all(|part| matches!(part, Part::Net(..))) {
+        true => tolerance.mix_of_nets,
+        false => tolerance.mix,
+    };
+    let lives = models.into_iter().map(|(i, ages)| life(i, &phases[i], &ages, mix(&phases[i]))).collect();
     Lives { lives, of_phase }
 }
 

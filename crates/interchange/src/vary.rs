@@ -73,7 +73,7 @@ pub(crate) fn vary<T: Send>(
     work: impl Fn(Varied, &Palette) -> T + Sync,
     mut take: impl FnMut(f64, T) -> Result<(), Error>,
 ) -> Result<(), Error> {
-    let nursery = Nursery::new(&session.model, settings).without_ground();
+    let nursery = Nursery::new(&session.model, settings);
     let mut blank = nursery.blank();
     blank.notes_poses = true;
     blank.accuracy = (1.0 - OF_TRIANGLES) * options.tolerance() / options.metres;

@@ -22,7 +22,7 @@ use dlsys_geometry::turtle::{self, Strains};
 use dlsys_model::{self as model, Model};
 use dlsys_sim::{self as sim, Settings, Simulation, brief};
 use dlsys_surround::{
-    self as surround, Classes, Gases, Motion, Passive as Following, Place, Sheets, Terrain, Weather,
+    self as surround, Classes, Gases, Motion, Passive as Following, Place, Quilt, Sheets, Terrain, Weather,
 };
 use dlsys_tree::ModuleString;
 
@@ -101,6 +101,8 @@ pub struct Nursery<'m> {
     threads: usize,
     has_gases: bool,
     has_ground: bool,
+    /// Ground that gives way is drawn by [`Nursery::draw_quilt`] only.
+    is_in_pieces: bool,
     /// The material of ground that gives way.
     earth: MaterialId,
 }
@@ -148,6 +150,7 @@ impl<'m> Nursery<'m> {
             threads: 1,
             has_gases: true,
             has_ground: true,
+            is_in_pieces: false,
             earth: MaterialId::LEAF,
         }
     }
@@ -165,6 +168,39 @@ impl<'m> Nursery<'m> {
     /// Without the surface of ground that gives way, which then costs nothing.
     pub fn without_ground(self) -> Nursery<'m> {
         Nursery { has_ground: false, ..self }
+    }
+
+    /// Ground that gives way is left out of drawings; [`Nursery::draw_quilt`] draws it in pieces.
+    pub fn with_ground_in_pieces(self) -> Nursery<'m> {
+        Nursery { is_in_pieces: true, ..self }
+    }
+
+    /// Ground that gives way as pieces that serve for all times up to one; `None` without such ground.
+    ///
+    /// # Errors
+    /// As of [`Nursery::draw`].
+    pub fn quilt(&self, until: f64) -> Result<Option<Quilt>, DrawError> {
+        let Passive { motion, terrain, .. } = self.passive()?;
+        let quilt = terrain.as_ref().map(|terrain| terrain.quilt(until, self.earth, motion.as_ref()));
+        Ok(quilt.transpose()?)
+    }
+
+    /// Draws the pieces at a time, and what lies on bodies.
+    ///
+    /// # Errors
+    /// As of [`Nursery::draw`].
+    pub fn draw_quilt(&self, time: f64, quilt: &Quilt, scene: &mut Scene) -> Result<(), DrawError> {
+        let Passive { motion, terrain, .. } = self.passive()?;
+        match terrain {
+            Some(terrain) => Ok(terrain.draw_quilt(time, quilt, motion.as_ref(), scene)?),
+            None => Ok(()),
+        }
+    }
+
+    /// The times after one and up to another at which ground that gives way changes.
+    pub fn ticks(&self, from: f64, to: f64) -> Vec<f64> {
+        let terrain = self.passive().ok().and_then(|passive| passive.terrain.as_ref());
+        terrain.map_or_else(Vec::new, |terrain| terrain.ticks(from, to).collect())
     }
 
     /// For pictures of this size, in which plants that are small move by the modes of their class, with an error below its bound, and plants that
@@ -200,7 +236,7 @@ impl<'m> Nursery<'m> {
             Some(gases) => gases.at(string.time, motion.as_ref())?,
             None => Vec::new(),
         };
-        let ground = match terrain {
+        let ground = match terrain.as_ref().filter(|_| !self.is_in_pieces) {
             Some(terrain) => Some(terrain.at(string.time, self.earth, motion.as_ref())?),
             None => None,
         };

@@ -15,7 +15,7 @@
 //! - [`Gases`]: smoke, steam and pollen at any time.
 //! - [`Sheets`]: flexible surfaces and nets at any time.
 //! - [`Loose`]: what is let go, as a body.
-//! - [`Terrain`]: ground that gives way, at any time.
+//! - [`Terrain`]: ground that gives way, at any time; [`Quilt`]: in pieces whose triangles stay the same.
 //! - [`Motion`]: the stems and the flights of a model at any time, as [`BentStems`] for [`draw_bent`](dlsys_geometry::turtle::draw_bent).
 
 #![warn(missing_docs)]
@@ -43,6 +43,7 @@ mod place;
 mod points;
 mod pressing;
 mod pushed;
+mod quilt;
 mod sheets;
 mod solids;
 mod survey;
@@ -58,6 +59,7 @@ pub use hanging::TICK as SHEET_TICK;
 pub use loose::Loose;
 pub use motion::{MOST_TICKS, Motion, Passive};
 pub use place::Place;
+pub use quilt::Quilt;
 pub use sheets::Sheets;
 pub use survey::{Axis, Survey, Vibration, moves};
 pub use terrain::{TICKS as GROUND_TICKS, Terrain, TerrainReport};

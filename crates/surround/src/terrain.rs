@@ -42,17 +42,17 @@ const ACCURACY: f64 = 0.1;
 pub struct Terrain<'m> {
     model: &'m Model,
     settings: Settings,
-    place: Place,
+    pub(crate) place: Place,
     /// Some module may draw a body or a shelf.
     has_bodies: bool,
-    state: Mutex<State<'m>>,
+    pub(crate) state: Mutex<State<'m>>,
 }
 
 /// The ground at a tick, and the bodies there.
 #[derive(Clone)]
 pub(crate) struct Moment {
     number: u64,
-    ground: Ground,
+    pub(crate) ground: Ground,
     bodies: Arc<Vec<Placed>>,
 }
 
@@ -63,7 +63,7 @@ struct Course<'m> {
     moment: Moment,
 }
 
-struct State<'m> {
+pub(crate) struct State<'m> {
     start: Course<'m>,
     /// The bodies of the start are known.
     has_begun: bool,
@@ -186,7 +186,12 @@ impl<'m> Terrain<'m> {
     }
 
     /// The ground at the tick at or before a time of the model.
-    fn reach(&self, state: &mut State<'m>, time: f64, motion: Option<&Motion<'m>>) -> Result<Moment, Error> {
+    pub(crate) fn reach(
+        &self,
+        state: &mut State<'m>,
+        time: f64,
+        motion: Option<&Motion<'m>>,
+    ) -> Result<Moment, Error> {
         let number = (self.place.seconds(time).max(0.0) * TICKS + SLACK).floor();
         if number > MOST_TICKS {
             let seconds = self.place.units.time;
@@ -333,7 +338,7 @@ impl<'m> Terrain<'m> {
         let mut triangles = Vec::new();
         for mesh in [ground.mesh(), ground.heaps()] {
             let first = points.len() as u32;
-            points.extend(mesh.points.iter().map(|point| Point::from(point / metre)));
+            points.extend(from_metres(&mesh.points, metre));
             triangles.extend(mesh.triangles.iter().map(|corners| (corners.map(|n| first + n), material)));
         }
         scene::Mesh::of_triangles(points, &[], triangles)
@@ -369,6 +374,11 @@ impl<'m> Terrain<'m> {
         let span = declared().or(pour).unwrap_or_else(|| self.span());
         Error::Ground { error, time, metre: self.place.units.length, span }
     }
+}
+
+/// Points in m in units of the model.
+pub(crate) fn from_metres(points: &[ground::Vector], metre: f64) -> Vec<Point> {
+    points.iter().map(|point| Point::from(point / metre)).collect()
 }
 
 /// The columns that a declaration describes, in SI.

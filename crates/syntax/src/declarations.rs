@@ -262,7 +262,11 @@ pub static DECLARATIONS: [Declaration; 35] = [
         usage: "at X, Y, Z towards X, Y, Z angle DEGREES",
         summary: "the eye, the point that it looks at, and the angle of view; they may depend on t",
         category: Category::Scene,
-        options: &[option("towards", Follow::Value), option("angle", Follow::Value)],
+        options: &[
+            option("at", Follow::Value),
+            option("towards", Follow::Value),
+            option("angle", Follow::Value),
+        ],
         begins: Begins::BeforeValue,
         written: "a camera is written `camera at 0, 1, 5 towards 0, 1, 0 angle 40`",
         ..row("camera", Rule::camera_item)

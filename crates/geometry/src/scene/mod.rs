@@ -340,7 +340,9 @@ impl Scene {
 
     /// Adds ground of soil: a mesh in scene units.
     pub fn add_terrain(&mut self, mesh: Arc<Mesh>) {
-        let owner = self.add_owner(Owner { name: "=ground".into(), lineage: Lineage::of_axiom(0) });
+        // No module has this line of descent.
+        let lineage = Lineage::of_axiom(0).child(u64::MAX, 0);
+        let owner = self.add_owner(Owner { name: "=ground".into(), lineage });
         let axes = [Vector::x(), Vector::y(), Vector::z()];
         let placement = Placement::uniform(Point::origin(), axes, 1.0);
         self.surfaces.push(Surface { mesh, patches: None, rest: None, placement, tint: None, owner });

@@ -179,6 +179,8 @@ pub(super) enum Remark {
     PolygonNotClosed,
     /// Widths of two segments of one axis that meet.
     Step(f64, f64),
+    /// A stem of a solid module or a shelf on soil, without a width of its own.
+    NoWidthBody,
 }
 
 /// The warnings of a frame, each once for each place.
@@ -298,6 +300,11 @@ fn warning(remark: Remark, model: &Model, span: Option<Span>, time: f64) -> Diag
             "the width of a stem changes at once".to_owned(),
             format!("from {} to {} at t = {time}", short(from), short(to)),
             "write `@W(w)` in place of `!(w)`: the stem before it tapers to that width".to_owned(),
+        ),
+        Remark::NoWidthBody => (
+            "a stem without a width is no body on soil".to_owned(),
+            format!("its width is not set at t = {time}: it presses nothing and carries nothing"),
+            "write `!(w)` before it, with its width in units of the model".to_owned(),
         ),
     };
     let warning = Diagnostic::warning(message);

@@ -114,6 +114,7 @@ mod tests {
             ("light   -1,2 , -3", "light -1, 2, -3"),
             ("ground -0.5", "ground -0.5"),
             ("camera at 0,1,-5 towards -x,0 , 0 angle 30", "camera at 0, 1, -5 towards -x, 0, 0 angle 30"),
+            ("camera at -1,1,5 towards 0, 1, 0", "camera at -1, 1, 5 towards 0, 1, 0"),
             ("units  time 86400 ,length 0.01", "units time 86400, length 0.01"),
             (
                 "wind 1,-0.2 , 0 speed 3+sin( t ) turbulence 0.3 scale -x period 8 seed 7 spectrum kolmogorov 1,4,-y",

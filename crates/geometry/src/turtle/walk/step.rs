@@ -167,6 +167,7 @@ impl Walk<'_> {
         let (follows, grows_from) = (self.state.last.take(), self.state.parent.take());
         let node = std::mem::replace(&mut self.state.node, false);
         if draw && self.polygons.is_empty() {
+            self.check_body();
             let material = self.chosen().unwrap_or(MaterialId::STEM);
             if let Some(before) = follows.filter(|_| !node) {
                 self.check_step(before, material);

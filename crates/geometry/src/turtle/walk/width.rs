@@ -30,6 +30,20 @@ impl Walk<'_> {
         }
     }
 
+    /// Warns if a stem of the default width is drawn by what should press into soil or carry what falls.
+    pub(super) fn check_body(&mut self) {
+        let scenery = &self.model.scenery;
+        let is_body =
+            |kind: KindId| scenery.solids.iter().chain(&scenery.shelves).any(|(own, _)| *own == kind);
+        if scenery.bed.is_some()
+            && matches!(self.state.width, Width::Default(_))
+            && self.recorder.is_none()
+            && is_body(self.drawn.kind)
+        {
+            self.remark(Remark::NoWidthBody);
+        }
+    }
+
     /// Warns if the segment that begins here continues one of another width, at a place where nothing else is drawn, and if
     /// that can be seen.
     pub(super) fn check_step(&mut self, before: usize, material: MaterialId) {

@@ -1,0 +1,94 @@
+//! Ground that gives way in pieces whose triangles stay the same while their points move, for files that animate points.
+
+use std::sync::{Arc, PoisonError};
+
+use dlsys_geometry::scene::{self, MaterialId, Owner, Placement, Point, Scene, Surface, Vector};
+use dlsys_ground as ground;
+use dlsys_tree::Lineage;
+
+use crate::Error;
+use crate::motion::Motion;
+use crate::terrain::{TICKS, Terrain, from_metres};
+
+/// The name of ground in files.
+const NAME: &str = "ground";
+/// The number of productions that stands for none: the lineages of pieces are no others.
+const NO_PRODUCTION: u64 = u64::MAX;
+
+/// The pieces of a ground, with their meshes at the time at which they were made.
+pub struct Quilt {
+    pieces: Vec<(ground::Piece, Arc<scene::Mesh>)>,
+    material: MaterialId,
+}
+
+impl<'m> Terrain<'m> {
+    /// The times of the ticks after a time of the model, up to another one.
+    pub fn ticks(&self, from: f64, to: f64) -> impl Iterator<Item = f64> {
+        let place = self.place;
+        let first = (place.seconds(from).max(0.0) * TICKS).floor() as u64 + 1;
+        let times = (first..).map(move |number| place.time_at(number as f64 / TICKS));
+        times.skip_while(move |time| *time <= from).take_while(move |time| *time <= to)
+    }
+
+    /// Pieces that serve for all times up to one of the model.
+    ///
+    /// # Errors
+    /// As of [`Terrain::at`].
+    pub fn quilt(
+        &self,
+        until: f64,
+        material: MaterialId,
+        motion: Option<&Motion<'m>>,
+    ) -> Result<Quilt, Error> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let moment = self.reach(&mut state, until, motion)?;
+        let metre = self.place.units.length;
+        let with_mesh = |piece: ground::Piece| {
+            let points = from_metres(&moment.ground.points(&piece), metre);
+            let triangles = piece.triangles.iter().map(|corners| (*corners, material));
+            let mesh = Arc::new(scene::Mesh::of_triangles(points, &[], triangles));
+            (piece, mesh)
+        };
+        Ok(Quilt { pieces: moment.ground.pieces().into_iter().map(with_mesh).collect(), material })
+    }
+
+    /// Adds the pieces at a time of the model to a scene, and what lies on bodies.
+    ///
+    /// # Errors
+    /// As of [`Terrain::at`].
+    pub fn draw_quilt(
+        &self,
+        time: f64,
+        quilt: &Quilt,
+        motion: Option<&Motion<'m>>,
+        scene: &mut Scene,
+    ) -> Result<(), Error> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let moment = self.reach(&mut state, time, motion)?;
+        drop(state);
+        let metre = self.place.units.length;
+        // What lies on bodies is the first owner, also where there is nothing.
+        let owner = |number: usize| {
+            let lineage = Lineage::of_axiom(0).child(NO_PRODUCTION, number);
+            Owner { name: NAME.into(), lineage }
+        };
+        let owners: Vec<_> = (0..=quilt.pieces.len()).map(|number| scene.add_owner(owner(number))).collect();
+        let mut add = |number: usize, mesh: Arc<scene::Mesh>, rest: Option<Arc<scene::Mesh>>| {
+            let owner = owners[number];
+            let axes = [Vector::x(), Vector::y(), Vector::z()];
+            let placement = Placement::uniform(Point::origin(), axes, 1.0);
+            scene.surfaces.push(Surface { mesh, patches: None, rest, placement, tint: None, owner });
+        };
+        for (number, (piece, rest)) in quilt.pieces.iter().enumerate() {
+            let mesh = rest.moved(from_metres(&moment.ground.points(piece), metre));
+            add(number + 1, Arc::new(mesh), Some(Arc::clone(rest)));
+        }
+        let heaps = moment.ground.heaps();
+        if !heaps.triangles.is_empty() {
+            let triangles = heaps.triangles.iter().map(|corners| (*corners, quilt.material));
+            let mesh = scene::Mesh::of_triangles(from_metres(&heaps.points, metre), &[], triangles);
+            add(0, Arc::new(mesh), None);
+        }
+        Ok(())
+    }
+}
