@@ -264,3 +264,51 @@ fn files_that_play_have_one_mesh_for_a_sheet() {
     let allowed = followed.options.accuracy * followed.options.extent * followed.options.metres;
     assert!(worst > 0.0 && worst <= allowed, "{worst} of {allowed}");
 }
+
+/// A production that makes two of a module hands its sheet to the first; the other one has a sheet of its own, where the turtle stands.
+#[test]
+fn a_copy_of_a_module_has_a_sheet_of_its_own() {
+    let session = session(&format!(
+        "{CLOTH}initial string: A\nA: if age = 0.5 produce [ B ] -(90) f(2) +(90) B\n\
+         B: if age = 0.5 produce C\ninterpret A: @Cloth\ninterpret B: @Cloth\ninterpret C: @Cloth\n"
+    ));
+    let nursery = Nursery::new(&session.model, Settings::default());
+    let alone = points(&session, &[0.45])[0].clone();
+    for time in [0.55, 0.75, 1.3] {
+        let scene = draw(&nursery, &session, time);
+        let least = |n: usize| {
+            let vertices = &scene.surfaces[n].mesh.vertices;
+            vertices.iter().map(|point| point.x).fold(f64::INFINITY, f64::min)
+        };
+        assert_eq!(scene.surfaces.len(), 2);
+        assert!(least(0).abs() < 0.1 && (least(1) - 2.0).abs() < 0.1, "{time}: {} {}", least(0), least(1));
+    }
+    // The first has hung on, the other one begins flat.
+    let scene = draw(&nursery, &session, 0.5 + 1e-9);
+    let sag = |points: &[Point]| points.iter().map(|point| point.y.abs()).fold(0.0, f64::max);
+    assert!(
+        sag(&scene.surfaces[1].mesh.vertices) < 1e-6
+            && sag(&scene.surfaces[0].mesh.vertices) > 0.5 * sag(&alone)
+    );
+}
+
+/// A flag in still air hangs down: the plane in which it begins is no rest.
+#[test]
+fn a_flag_in_still_air_hangs_down() {
+    let mut text = String::new();
+    for k in 0..25 {
+        text += &format!("v {} {} 0\n", (k % 5) as f64 / 4.0, (k / 5) as f64 / 8.0);
+    }
+    for k in 0..16 {
+        let a = k / 4 * 5 + k % 4 + 1;
+        text += &format!("f {} {} {} {}\n", a, a + 1, a + 6, a + 5);
+    }
+    let model = "tissue silk = stiffness 1e6, density 500, damping 0.2, thickness 0.0002\n\
+                 sheet @Cloth from \"cloth.obj\" of silk pinned x < 0.01\ninitial string: f(2) @Cloth\n";
+    let session = with_mesh(model, &text).unwrap_or_else(|error| panic!("{error}"));
+    let [first, later] = &points(&session, &[0.1, 12.0])[..] else { panic!("two times") };
+    let lowest = |points: &[Point]| points.iter().map(|point| point.y).fold(f64::INFINITY, f64::min);
+    let flat = first.iter().map(|point| point.z.abs()).fold(0.0, f64::max);
+    assert!(flat < 1e-3, "it begins flat: {flat}");
+    assert!(lowest(later) < 1.7, "it hangs down to {}", lowest(later));
+}

@@ -9,7 +9,7 @@
 //! A sheet begins at the birth of its module, at rest in the shape of its file, where the turtle stands then. It hangs on the descent of its
 //! module: a production that places it again changes nothing.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -21,6 +21,7 @@ use dlsys_sheet::{
 };
 use dlsys_sim::{Passed, Simulation};
 use dlsys_tree::ModuleString;
+use dlsys_wind::Draw;
 
 use crate::descent::Descent;
 use crate::leading::Leading;
@@ -32,6 +33,10 @@ use crate::{Error, MOST_SHEET_POINTS};
 
 /// Seconds from one tick of the sheets to the next. A power of 2, so that its multiples are exact.
 pub const TICK: f64 = 1.0 / 64.0;
+
+/// Largest speed along each axis, in m/s, with which points begin, at random: a sheet in an upright plane would not leave it otherwise, and a flag would
+/// stand out in still air for ever. Nobody sees it: it moves a point by some micrometres.
+const TREMBLE: f64 = 1e-4;
 
 /// A sheet that a module has placed.
 #[derive(Debug)]
@@ -301,13 +306,11 @@ impl<'m> Hanging<'m> {
 
     /// Adds the sheets of a drawing at a time in s that are not known.
     fn find_new(&self, (scene, now): (&Scene, f64), view: &mut View) -> Result<(), Error> {
-        for place in &scene.sheets {
-            let known = |hung: &Arc<Hung>| hung.key.number == place.key.number;
-            let line: HashSet<u64> = view.descent.line(place.key.module).collect();
-            let mut all = self.hung.iter().map(|hanger| &hanger.hung).chain(&view.births);
-            if all.any(|hung| known(hung) && line.contains(&hung.key.module)) {
-                continue;
-            }
+        let known = self.hung.iter().map(|hanger| hanger.hung.key);
+        let known: Vec<SheetKey> = known.chain(view.births.iter().map(|hung| hung.key)).collect();
+        let matched = matched(&scene.sheets, &known, &view.descent);
+        for place in scene.sheets.iter().zip(matched).filter(|(_, known)| known.is_none()).map(|pair| pair.0)
+        {
             let points = self.points() + view.births.iter().map(|hung| hung.made.len()).sum::<usize>();
             view.births.push(Arc::new(self.hang(place, now, points)?));
         }
@@ -338,7 +341,15 @@ impl<'m> Hanging<'m> {
     /// The sheets in the order in which they are followed, with those that are born in a view.
     pub(crate) fn hangers(&self, view: &View) -> Vec<Hanger> {
         let born = |hung: &Arc<Hung>| {
-            let state = State::at_rest(&hung.made);
+            let mut state = State::at_rest(&hung.made);
+            let pinned = &self.model.scenery.sheets[hung.sheet].pinned;
+            let draw = Draw::new(hung.key.module).of(hung.key.number.into());
+            for (point, velocity) in
+                state.velocities.iter_mut().enumerate().filter(|(point, _)| !pinned[*point])
+            {
+                let part = |axis| 2.0 * draw.of(point as u64).of(axis).unit() - 1.0;
+                *velocity = Vector::new(part(0), part(1), part(2)) * TREMBLE;
+            }
             Hanger { hung: hung.clone(), state, forces: Vec::new() }
         };
         self.hung.iter().cloned().chain(view.births.iter().map(born)).collect()
@@ -419,12 +430,9 @@ impl<'m> Hanging<'m> {
         let mut hung: Vec<Hanger> = tracks.iter().filter_map(last).collect();
         if let Some(places) = &view.next {
             let mut here: Vec<Hanger> = Vec::with_capacity(places.len());
-            for place in places {
-                let before = view.descent.line(place.key.module).find_map(|module| {
-                    let key = SheetKey { module, ..place.key };
-                    hung.iter().find(|hanger| hanger.hung.key == key)
-                });
-                let Some(before) = before else { continue };
+            let known: Vec<SheetKey> = hung.iter().map(|hanger| hanger.hung.key).collect();
+            for (place, known) in places.iter().zip(matched(places, &known, &view.descent)) {
+                let Some(before) = known.map(|known| &hung[known]) else { continue };
                 let Hung { sheet, ref made, begin, .. } = *before.hung;
                 let made = Arc::clone(made);
                 let next = Arc::new(Hung { key: place.key, origin: place.origin, sheet, made, begin });
@@ -437,6 +445,18 @@ impl<'m> Hanging<'m> {
         let part = Part { end: begin + length, tracks, descent: view.descent, forces };
         (part, view.failed)
     }
+}
+
+/// For each place of a sheet the number of the sheet that hangs there: that of its module, or of one before it. Where a production has made two of a
+/// module, the first goes on with its sheets, and the others have new ones.
+pub(crate) fn matched(places: &[SheetPlace], known: &[SheetKey], descent: &Descent) -> Vec<Option<usize>> {
+    let mut free: HashMap<SheetKey, usize> = known.iter().copied().zip(0..).collect();
+    let mut found: Vec<Option<usize>> = places.iter().map(|place| free.remove(&place.key)).collect();
+    for (place, found) in places.iter().zip(&mut found).filter(|(_, found)| found.is_none()) {
+        let mut line = descent.line(place.key.module).skip(1);
+        *found = line.find_map(|module| free.remove(&SheetKey { module, ..place.key }));
+    }
+    found
 }
 
 /// The material of a tissue of constant stiffness.

@@ -1,6 +1,5 @@
 //! The sheets of a model at any time: flexible surfaces and nets, the same bits whatever is asked for, in whatever order.
 
-use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -15,7 +14,7 @@ use dlsys_sim::{Settings, Simulation};
 
 use crate::Error;
 use crate::coupled;
-use crate::hanging::{Hanging, TICK, Tick};
+use crate::hanging::{Hanging, TICK, Tick, matched};
 use crate::marks::{Marks, Recent};
 use crate::motion::MOST_TICKS;
 use crate::place::Place;
@@ -78,15 +77,10 @@ impl<'m> Sheets<'m> {
         let seconds = self.place.seconds(time).max(0.0);
         let tick = self.tick(time, seconds)?;
         let Some(part) = tick.part(seconds) else { return Ok(()) };
-        let tracks: HashMap<SheetKey, usize> =
-            part.tracks.iter().enumerate().map(|(i, track)| (track.hung.key, i)).collect();
+        let known: Vec<SheetKey> = part.tracks.iter().map(|track| track.hung.key).collect();
         let places = scene.sheets.clone();
-        for place in &places {
-            let known = part
-                .descent
-                .line(place.key.module)
-                .find_map(|module| tracks.get(&SheetKey { module, ..place.key }));
-            let state = known.and_then(|track| part.tracks[*track].at(seconds));
+        for (place, known) in places.iter().zip(matched(&places, &known, &part.descent)) {
+            let state = known.and_then(|track| part.tracks[track].at(seconds));
             self.add(place, state, scene);
         }
         Ok(())
