@@ -317,7 +317,7 @@ fn mistakes_have_their_place() {
     assert!(said.contains("the rules of the plant `@Other` read the force of sheets"), "{said}");
 }
 
-/// The net of the book slows the ball down, as in Table I of O'Brien, Zordan and Hodgins: 15.7 N in the mean.
+/// The net of the book slows the ball down.
 #[test]
 fn the_ball_of_the_book_is_slowed_down() {
     let path = repository("models/scenes/swish.dls");
