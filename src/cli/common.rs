@@ -15,7 +15,7 @@ use crate::compile::Setting;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::Frames;
 use crate::scene::Scene;
-use crate::session::{Detail, Nursery, Session, SwayReport};
+use crate::session::{Detail, DrawError, Nursery, Session, SwayReport};
 use crate::sim::{self, Settings, Simulation, Stats};
 use crate::tree::ModuleString;
 use crate::turtle;
@@ -141,8 +141,8 @@ struct Remarks {
     waiting: Vec<Diagnostic>,
     /// What is written holds no gases.
     lacks_gases: bool,
-    /// What is written holds no ground of soil.
-    lacks_ground: bool,
+    /// What is written has ground of soil in pieces of its own.
+    has_ground_in_pieces: bool,
 }
 
 /// The content of the file of `--stats`.
@@ -304,10 +304,10 @@ impl ModelRun {
     /// Draws the strings of a run, with plants of other models.
     pub fn nursery(&self) -> Nursery<'_> {
         let nursery = Nursery::new(&self.session.model, self.settings).for_picture(self.detail);
-        let Remarks { lacks_gases, lacks_ground, .. } =
+        let Remarks { lacks_gases, has_ground_in_pieces, .. } =
             *self.remarks.lock().unwrap_or_else(PoisonError::into_inner);
         let nursery = if lacks_gases { nursery.without_gases() } else { nursery };
-        if lacks_ground { nursery.without_ground() } else { nursery }
+        if has_ground_in_pieces { nursery.with_ground_in_pieces() } else { nursery }
     }
 
     /// Notes that files or pages of some sort do not hold the gases of the model, if it has any; these are not followed then.
@@ -322,15 +322,9 @@ impl ModelRun {
         }
     }
 
-    /// Notes that files or pages of some sort do not hold ground of soil, if the model has one; it is not followed then.
-    pub fn note_missing_ground(&self, what: &str) {
-        if let Some(bed) = &self.session.model.scenery.bed {
-            let warning = Diagnostic::warning(format!("{what} does not hold ground of soil"))
-                .at(bed.span, "it is not seen in it")
-                .help("pictures (PNG, SVG), films and OBJ files have it: `dlsys render MODEL --format png`");
-            self.note(vec![warning]);
-            self.remarks.lock().unwrap_or_else(PoisonError::into_inner).lacks_ground = true;
-        }
+    /// Frames are drawn without ground of soil, whose pieces [`Nursery::draw_quilt`] draws.
+    pub fn take_ground_in_pieces(&self) {
+        self.remarks.lock().unwrap_or_else(PoisonError::into_inner).has_ground_in_pieces = true;
     }
 
     /// Notes how the plants of a pass were followed in the wind. A pass of scenes that are kept follows none.
@@ -350,9 +344,12 @@ impl ModelRun {
     /// # Errors
     /// An error of the turtle, with its place in the text.
     pub fn draw(&self, nursery: &Nursery, string: &ModuleString, scene: &mut Scene) -> Result<(), Failure> {
-        nursery
-            .draw(string, scene)
-            .map_err(|error| Failure::Model(error.diagnostic().render(&self.session.source, coloured())))
+        nursery.draw(string, scene).map_err(|error| self.misdrawn(&error))
+    }
+
+    /// The failure for an error of drawing, with the rendered message.
+    pub fn misdrawn(&self, error: &DrawError) -> Failure {
+        Failure::Model(error.diagnostic().render(&self.session.source, coloured()))
     }
 
     /// Adds the warnings of a frame; new ones are kept for [`ModelRun::warn`].

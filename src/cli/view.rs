@@ -8,7 +8,8 @@ use super::args::ViewArgs;
 use super::common::{Failure, ModelRun, count_of, out_error};
 use super::frame_source::{Frame, Pass, play};
 use super::progress::Progress;
-use crate::player::{Recorder, Recording, Stage, page};
+use crate::diagnostic::Diagnostic;
+use crate::player::{Clouds, Recorder, Recording, Stage, page};
 use crate::render::{self, Survey, View};
 use crate::scene::Scene;
 use crate::sim::Settings;
@@ -114,8 +115,7 @@ fn spare(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
 /// cores; the recording does not depend on their number.
 fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    run.note_missing_gases("the page for the browser");
-    run.note_missing_ground("the page for the browser");
+    run.take_ground_in_pieces();
     let mut clock = run.clock;
     let nothing = Survey::new(View::FRONT);
     let mut survey = nothing.clone();
@@ -125,10 +125,12 @@ fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
     let of_frame = |_: &Frame, scene: &Scene| {
         let mut survey = nothing.clone();
         survey.add(scene);
-        survey
+        (survey, scene.gases.iter().map(|gas| gas.blobs.len() as u64).sum::<u64>())
     };
-    play(run, pass, threads, &mut clock, None, of_frame, |frame| {
+    let (mut blobs, mut fullest) = (0, 0);
+    play(run, pass, threads, &mut clock, None, of_frame, |(frame, count)| {
         survey.merge(&frame);
+        (blobs, fullest) = (blobs + count, count.max(fullest));
         progress.inc();
         Ok(())
     })?;
@@ -144,6 +146,21 @@ fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
         Path::new(&source.name).file_name().map_or(source.name.clone(), |n| n.to_string_lossy().into());
     let mut recorder = Recorder::new(model, &run.nursery().blank(), &name, &fit);
     recorder.surround(&survey.first_surroundings());
+    let clouds = Clouds::of(blobs, fullest);
+    if clouds.share() > 1 {
+        let warning = Diagnostic::warning(format!("the page shows one of {} blobs of gas", clouds.share()))
+            .help("what it shows is as dense as all of them; for all of them in each frame, take pictures: `dlsys render MODEL --format png`");
+        run.note(vec![warning]);
+        run.warn();
+    }
+    recorder.expect(clouds);
+    // Ground is followed in the order of time, in pieces that serve for all frames.
+    let ground = run.nursery();
+    let quilt = match run.times.last() {
+        Some(end) => ground.quilt(*end).map_err(|error| run.misdrawn(&error))?,
+        None => None,
+    };
+    let mut bare = ground.blank();
     let pass = Pass {
         settings: Settings { log: true, ..run.settings },
         keeping: Keeping::Nothing,
@@ -155,7 +172,12 @@ fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
         stage.set(scene, &fit);
         (frame.time, frame.modules() as u64, frame.events().to_vec(), stage)
     };
-    play(run, pass, threads, &mut clock, None, staged, |(time, modules, events, stage)| {
+    play(run, pass, threads, &mut clock, None, staged, |(time, modules, events, mut stage)| {
+        if let Some(quilt) = &quilt {
+            bare.clear();
+            ground.draw_quilt(time, quilt, &mut bare).map_err(|error| run.misdrawn(&error))?;
+            stage.add_ground(&bare);
+        }
         recorder.history().add(&events, model, source);
         progress.inc();
         recorder.add(time, modules, &stage).map_err(|error| {

@@ -55,7 +55,7 @@ fn a_plume_in_uniform_wind_is_the_formula() {
     for (older, blob) in smoke.blobs.iter().zip(&smoke.blobs[1..]) {
         assert!((older.centre.x - blob.centre.x - 2.0 / 40.0).abs() < 1e-12);
     }
-    for Blob { centre, deviation, mass } in &smoke.blobs {
+    for Blob { centre, deviation, mass, .. } in &smoke.blobs {
         let age = centre.x / 2.0;
         assert!(centre.y == 0.0 && centre.z == 0.0 && (0.0..=3.0).contains(&age));
         assert!((deviation * deviation - (0.05 * 0.05 + 2.0 * 1e-3 * age)).abs() < 1e-12);
@@ -301,6 +301,8 @@ fn gas_over_soil_and_shelves_without_soil_are_reported() {
     let soil = "soil p = sand\nground p cell 0.1\n";
     assert_eq!(said(&format!("{GAS}{soil}{source}")), ["gas goes through ground of soil"]);
     assert!(said(&format!("{GAS}ground 0\n{source}")).is_empty());
+    let rising = GAS.replacen("size", "fall -0.1, size", 1);
+    assert!(said(&format!("{rising}{soil}{source}")).is_empty());
     let leaf = "shelf A\ninitial string: A\ninterpret A: @L(1)\n";
     assert_eq!(said(&format!("ground 0\n{leaf}")), ["`shelf` does nothing here"]);
     assert!(said(&format!("{soil}{leaf}")).is_empty());

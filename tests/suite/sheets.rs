@@ -133,6 +133,34 @@ fn a_solid_takes_a_sheet_along_and_does_not_pierce_it() {
     }
 }
 
+/// What a production puts elsewhere has not passed what is between, as on soil: the cloth between both places does not feel it.
+#[test]
+fn a_solid_that_is_put_elsewhere_passes_nothing() {
+    let hop = BALL.replace(
+        "solve dy/dt = -0.8",
+        "if age < 0.3 | y < 0 solve dy/dt = 0, if age = 0.3 & y > 0 produce Ball(-0.6)",
+    );
+    let hop = hop.replace("solve dy/dt = 0,", "solve dy/dt = 0\n ");
+    let alone = session(&format!("{CLOTH}{}", hop.replace("solid Ball\n", "")));
+    let among = session(&format!("{CLOTH}{hop}"));
+    let times = [0.29, 0.3125, 0.33, 0.5];
+    assert_eq!(points(&among, &times), points(&alone, &times));
+}
+
+/// A sheet on what bends is a mistake: it would stay where the stem is at rest.
+#[test]
+fn sheets_on_stems_that_bend_are_errors() {
+    for hold in ["@E(silk) !(0.1) F(1) @Cloth", "@E(silk) !(0.1) F(1) [ @E(0) F(1) @Cloth ]"] {
+        let session = session(&format!("{CLOTH}initial string: {hold}\n"));
+        let nursery = Nursery::new(&session.model, Settings::default());
+        let error = nursery.draw(&string(&session, 0.1), &mut nursery.blank()).expect_err("it bends");
+        let said = error.diagnostic().render(&session.source, false);
+        assert!(said.contains("places a sheet on stems that bend") && said.contains("model.dls:"), "{said}");
+    }
+    let session = session(&format!("{CLOTH}initial string: [ @E(silk) !(0.1) F(1) ] @Cloth\n"));
+    draw(&Nursery::new(&session.model, Settings::default()), &session, 0.1);
+}
+
 /// A cloth that is held along one side lies down on the ground.
 #[test]
 fn a_sheet_lies_on_the_ground() {

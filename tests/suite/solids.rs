@@ -194,3 +194,22 @@ fn bodies_that_cannot_push_the_wind_are_refused() {
     assert!(weather.at(0.999).is_ok());
     assert!(matches!(weather.at(1.5), Err(Error::Growth(_))));
 }
+
+/// What a plant of another model draws is no body, also behind drawings of drawings, and that is said when the model is read.
+#[test]
+fn plants_of_other_models_in_bodies_are_reported() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("twig.dls"), "initial string: F(1)\n").expect("written");
+    let said = |drawn: &str| {
+        let text = format!(
+            "wind 1, 0, 0 speed 1\nplant @Twig from \"twig.dls\"\nsolid A\ninitial string: A B\n\
+            interpret A: C\ninterpret C: {drawn}\ninterpret B: @Twig\n"
+        );
+        let path = folder.path().join("model.dls");
+        std::fs::write(&path, text).expect("written");
+        let session = Session::open(&path, &[]).unwrap_or_else(|refused| panic!("{refused}"));
+        session.warnings.iter().map(|warning| warning.message.clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(said("@O(1) @Twig"), ["`@Twig` is a plant of another model, and no body"]);
+    assert!(said("@O(1)").is_empty());
+}

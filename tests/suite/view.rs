@@ -5,10 +5,9 @@ use std::io::Read;
 
 use dlsys::player::{Form, Stage};
 use dlsys::render::{Survey, View};
-use dlsys::session::Session;
+use dlsys::session::{Nursery, Session};
 use dlsys::sim::Settings;
 use dlsys::tree::ModuleString;
-use dlsys::turtle;
 use serde_json::Value;
 
 use crate::cli::{bad, dlsys, good};
@@ -56,8 +55,8 @@ impl Track {
     }
 }
 
-fn tracks(page: &str) -> Vec<Track> {
-    let text = script(page, "tracks").trim();
+/// Bytes in base64, compressed.
+fn unpacked(text: &str) -> Numbers {
     let digit = |c: u8| match c {
         b'A'..=b'Z' => c - b'A',
         b'a'..=b'z' => c - b'a' + 26,
@@ -67,61 +66,113 @@ fn tracks(page: &str) -> Vec<Track> {
         _ => panic!("not base64: {c}"),
     };
     let mut packed = Vec::new();
-    for chunk in text.trim_end_matches('=').as_bytes().chunks(4) {
+    for chunk in text.trim().trim_end_matches('=').as_bytes().chunks(4) {
         let bits = chunk.iter().fold(0_u32, |bits, &c| bits << 6 | u32::from(digit(c)));
         let bits = bits << (6 * (4 - chunk.len()));
         packed.extend_from_slice(&bits.to_be_bytes()[1..chunk.len()]);
     }
     let mut bytes = Vec::new();
     flate2::read::ZlibDecoder::new(&packed[..]).read_to_end(&mut bytes).expect("zlib");
-    let mut at = 0;
-    let mut natural = || {
+    Numbers { bytes, at: 0 }
+}
+
+/// Whole numbers as pages have them.
+struct Numbers {
+    bytes: Vec<u8>,
+    at: usize,
+}
+
+impl Numbers {
+    fn natural(&mut self) -> u64 {
         let (mut number, mut shift) = (0_u64, 0);
         loop {
-            let byte = bytes[at];
-            at += 1;
+            let byte = self.bytes[self.at];
+            self.at += 1;
             number |= u64::from(byte & 127) << shift;
             shift += 7;
             if byte < 128 {
                 return number;
             }
         }
-    };
-    let heads: Vec<[u64; 6]> = (0..natural())
+    }
+
+    fn integer(&mut self) -> i64 {
+        let n = self.natural();
+        (n >> 1) as i64 ^ -((n & 1) as i64)
+    }
+
+    fn end(&self) {
+        assert_eq!(self.at, self.bytes.len(), "nothing is left over");
+    }
+}
+
+fn tracks(page: &str) -> Vec<Track> {
+    let mut numbers = unpacked(script(page, "tracks"));
+    let heads: Vec<([u64; 6], usize)> = (0..numbers.natural())
         .map(|_| {
-            let head = [(); 6].map(|()| natural());
+            let [kind, detail] = [(); 2].map(|()| numbers.natural());
+            let corners = if kind == 5 { numbers.natural() } else { detail };
+            let [first, span, log2, length] = [(); 4].map(|()| numbers.natural());
             // Looks: not looked at here.
-            (0..3 * natural()).for_each(|_| {
-                natural();
+            (0..3 * numbers.natural()).for_each(|_| {
+                numbers.natural();
             });
-            head
+            let width = [18, 9, 48, 3 * corners as usize, 12, 3 * corners as usize][kind as usize];
+            ([kind, detail, first, span, log2, length], width)
         })
         .collect();
     let mut tracks = Vec::new();
-    for [kind, detail, first, span, log2, length] in heads {
-        let width = [18, 9, 48, 3 * detail as usize, 12][kind as usize];
+    for ([kind, _, first, span, log2, length], width) in heads {
         let mut samples = vec![vec![0.0; width]; length as usize];
         let mut firsts = vec![0_i64; width];
         for number in 0..width {
-            let mut integer = || {
-                let n = natural();
-                (n >> 1) as i64 ^ -((n & 1) as i64)
-            };
-            let mut now =
-                integer() + if [2, 3].contains(&kind) && number >= 3 { firsts[number - 3] } else { 0 };
+            let is_near = [2, 3, 5].contains(&kind) && number >= 3;
+            let mut now = numbers.integer() + if is_near { firsts[number - 3] } else { 0 };
             let mut rate = 0;
             firsts[number] = now;
             samples[0][number] = now as f64;
             for sample in &mut samples[1..] {
-                rate += integer();
+                rate += numbers.integer();
                 now += rate;
                 sample[number] = now as f64;
             }
         }
         tracks.push(Track { kind, first, last: first + span, stride: 1 << log2, samples });
     }
-    assert_eq!(at, bytes.len(), "nothing is left over");
+    numbers.end();
     tracks
+}
+
+/// The blobs of gases in each frame, as the page has them: see `crates/player/src/clouds.rs`.
+fn clouds(said: &Value) -> Vec<Vec<[i64; 8]>> {
+    let mut numbers = unpacked(said["clouds"].as_str().expect("gases"));
+    let frames = said["times"].as_array().expect("a list").len();
+    let mut all: Vec<Vec<[i64; 8]>> = Vec::new();
+    for _ in 0..frames {
+        let runs: Vec<u64> = (0..numbers.natural()).map(|_| numbers.natural()).collect();
+        let fresh = numbers.natural();
+        let before = all.last().cloned().unwrap_or_default();
+        let kept = runs.iter().enumerate().flat_map(|(i, run)| (0..*run).map(move |_| i % 2 == 0));
+        let mut now: Vec<[i64; 8]> =
+            before.iter().zip(kept).filter(|(_, kept)| *kept).map(|(blob, _)| *blob).collect();
+        let first = now.len();
+        now.extend((0..fresh).map(|_| [0; 8]));
+        for k in 0..8 {
+            for i in 0..now.len() {
+                let from = if i < first {
+                    now[i][k]
+                } else if i > first {
+                    now[i - 1][k]
+                } else {
+                    0
+                };
+                now[i][k] = from + numbers.integer();
+            }
+        }
+        all.push(now);
+    }
+    numbers.end();
+    all
 }
 
 #[test]
@@ -180,13 +231,15 @@ fn is_what_the_turtle_draws(path: &str) {
     let times: Vec<f64> =
         said["times"].as_array().expect("a list").iter().map(|t| t.as_f64().expect("a number")).collect();
     let mut string = ModuleString::default();
-    let mut scene = turtle::blank(&session.model);
+    let nursery = Nursery::new(&session.model, Settings::default()).with_ground_in_pieces();
+    let quilt = nursery.quilt(times[times.len() - 1]).expect("drawable");
+    let (mut scene, mut ground) = (nursery.blank(), nursery.blank());
     let mut survey = Survey::new(View::FRONT);
     let mut simulation = session.simulate(Settings::default()).expect("it starts");
     for &time in &times {
         simulation.at(time, &mut string).expect("it runs");
         scene.clear();
-        turtle::draw(&session.model, &string, &mut scene).expect("drawable");
+        nursery.draw(&string, &mut scene).expect("drawable");
         survey.add(&scene);
     }
     let fit = survey.fit();
@@ -198,8 +251,13 @@ fn is_what_the_turtle_draws(path: &str) {
     for frame in (0..times.len()).step_by((times.len() / 6).max(1)) {
         simulation.at(times[frame], &mut string).expect("it runs");
         scene.clear();
-        turtle::draw(&session.model, &string, &mut scene).expect("drawable");
+        nursery.draw(&string, &mut scene).expect("drawable");
         stage.set(&scene, &fit);
+        if let Some(quilt) = &quilt {
+            ground.clear();
+            nursery.draw_quilt(times[frame], quilt, &mut ground).expect("drawable");
+            stage.add_ground(&ground);
+        }
         let now = frame as u64;
         let mut there: Vec<&Track> = tracks.iter().filter(|t| (t.first..=t.last).contains(&now)).collect();
         assert_eq!(there.len(), stage.items.len(), "{path}: things in frame {frame}");
@@ -210,9 +268,10 @@ fn is_what_the_turtle_draws(path: &str) {
                 Form::Patch => 2,
                 Form::Polygon(_) => 3,
                 Form::Stretched(_) => 4,
+                Form::Net(..) => 5,
             };
             let numbers: Vec<f64> = stage.numbers_of(item).to_vec();
-            let is_point = |i: usize| [2, 3].contains(&kind) || (if kind == 4 { i } else { i % 9 }) < 3;
+            let is_point = |i: usize| [2, 3, 5].contains(&kind) || (if kind == 4 { i } else { i % 9 }) < 3;
             let off = |track: &Track| -> f64 {
                 let shown = track.at(now).into_iter().enumerate();
                 let placed = shown.map(|(i, x)| x * unit + if is_point(i) { centre[i % 3] } else { 0.0 });
@@ -239,6 +298,64 @@ fn a_page_shows_what_the_turtle_draws() {
     is_what_the_turtle_draws("models/leaf.dls");
     is_what_the_turtle_draws("models/petal.dls");
     is_what_the_turtle_draws("models/abop/koch-island.dls");
+}
+
+/// Sheets and ground keep their meshes, whose points move; blobs are where they are, and those that are kept are the same ones.
+#[test]
+fn a_page_has_sheets_ground_and_gases() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("cloth.obj"), crate::sheets::cloth()).expect("written");
+    let path = folder.path().join("scene.dls");
+    let text = "tissue silk = stiffness 1e6, density 1000, damping 0.1, thickness 0.001\n\
+        sheet @Cloth from \"cloth.obj\" of silk pinned x < 0.01 | x > 0.99\n\
+        gas smoke = size 0.05, mass 1e-3, extinction 10, diffusion 1e-3, decay 3, fall -0.1\n\
+        soil beach = sand\nground beach cell 0.05 depth 0.5 height -1 extent 1\nsolid Ball\nframes 0 .. 0.4 step 0.1\n\
+        initial string: [ @Cloth ] @S(smoke, 40, 0.1) Ball(-0.7)\nBall(y): solve dy/dt = -0.8\n\
+        interpret Ball(y): [ f(y) @O(0.4) ]\n";
+    fs::write(&path, text).expect("written");
+    let path = path.to_str().expect("UTF-8");
+    is_what_the_turtle_draws(path);
+    let page = page(path, &[]);
+    let (said, tracks) = (description(&page), tracks(&page));
+    let nets = tracks.iter().filter(|track| track.kind == 5).count();
+    assert!(
+        nets >= 3 && tracks.iter().filter(|t| t.kind == 5).all(|t| [t.first, t.last] == [0, 4]),
+        "{nets}"
+    );
+    // Blobs, in any order, against the scene.
+    let session = Session::open(path.as_ref(), &[]).expect("a good model");
+    let nursery = Nursery::new(&session.model, Settings::default());
+    let (step, extent) =
+        (said["puffUnit"].as_f64().expect("a number"), said["extent"].as_f64().expect("a number"));
+    let clouds = clouds(&said);
+    assert!(step < 1e-3 * extent && clouds[4].len() > 10);
+    let mut simulation = session.simulate(Settings::default()).expect("it starts");
+    let mut string = ModuleString::default();
+    let mut survey = Survey::new(View::FRONT);
+    let mut scenes = Vec::new();
+    for time in [0.0, 0.1, 0.2, 0.3, 0.4] {
+        simulation.at(time, &mut string).expect("it runs");
+        let mut scene = nursery.blank();
+        nursery.draw(&string, &mut scene).expect("drawable");
+        survey.add(&scene);
+        scenes.push(scene);
+    }
+    let [low, high] = survey.fit().bounds.expect("something to see");
+    let centre = nalgebra::center(&low, &high);
+    for (frame, scene) in clouds.iter().zip(&scenes) {
+        let gas = &scene.gases[0];
+        assert_eq!(frame.len(), gas.blobs.len());
+        for blob in &gas.blobs {
+            let place = (blob.centre - centre) / step;
+            let depth = 256.0 + 16.0 * gas.depth(blob).log2();
+            let expected = [place.x, place.y, place.z, blob.deviation / step, depth];
+            let off = |code: &[i64; 8]| {
+                code.iter().zip(expected).map(|(a, b)| (*a as f64 - b).abs()).fold(0.0, f64::max)
+            };
+            let nearest = frame.iter().map(off).fold(f64::INFINITY, f64::min);
+            assert!(nearest <= 0.501, "{expected:?}: {nearest}");
+        }
+    }
 }
 
 #[test]

@@ -257,6 +257,7 @@ impl<'d> Parts<'d> {
         scene_checks::gases(&model, &all, &places.materials, diagnostics);
         scene_checks::gases_of_plants(&model, diagnostics);
         scene_checks::soil(&model, diagnostics);
+        scene_checks::plants_as_bodies(&model, diagnostics);
         sheets::modules(&model, &all, diagnostics);
         scene_checks::solids(&model, occurs, drawn, diagnostics);
         check::commands(&model, diagnostics, &all);

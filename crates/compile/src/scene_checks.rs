@@ -190,11 +190,37 @@ pub fn gases_of_plants(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
+/// Warns of bodies that are plants of other models, or hold one: these are no bodies.
+pub fn plants_as_bodies(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
+    let scenery = &model.scenery;
+    let is_plant = |kind: &Kind| scenery.plants.iter().any(|plant| plant.name == kind.name);
+    let bodies = scenery.solids.iter().map(|body| ("solid", body));
+    for (word, (kind, span)) in bodies.chain(scenery.shelves.iter().map(|shelf| ("shelf", shelf))) {
+        let mut known = vec![*kind];
+        let mut next = 0;
+        while let Some(kind) = known.get(next).copied() {
+            next += 1;
+            let drawn =
+                model.kinds.get(kind).interpretation.map(|number| &model.interpretations[number].drawn);
+            let inner: Vec<KindId> = drawn.into_iter().flat_map(|string| string.kinds()).collect();
+            known.extend(inner.into_iter().filter(|kind| !known.contains(kind)).collect::<Vec<_>>());
+        }
+        if let Some(plant) = known.iter().map(|kind| model.kinds.get(*kind)).find(|kind| is_plant(kind)) {
+            let name = &model.kinds.get(*kind).name;
+            diagnostics.push(
+                Diagnostic::warning(format!("`{}` is a plant of another model, and no body", plant.name))
+                    .at(*span, format!("`{word} {name}` leaves it out"))
+                    .help("draw the body with modules of this model: `@O(0.2)`, a stem with a width, or a `surface`"),
+            );
+        }
+    }
+}
+
 /// Warns of gas that ground of soil does not stop, and of shelves without a ground whose material they could carry.
 pub fn soil(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
     let scenery = &model.scenery;
     match (&scenery.bed, scenery.shelves.first()) {
-        (Some(bed), _) if !scenery.gases.is_empty() => diagnostics.push(
+        (Some(bed), _) if scenery.gases.iter().any(|gas| gas.fall >= 0.0) => diagnostics.push(
             Diagnostic::warning("gas goes through ground of soil")
                 .at(bed.span, "blobs that sink are not held up here")
                 .help("`ground H` alone holds them up; or let the gas rise: `fall -0.1`"),

@@ -69,6 +69,11 @@ impl Blobs {
         }
     }
 
+    /// What tells blobs from others at any time, in their order.
+    pub(crate) fn keys(&self) -> impl Iterator<Item = u64> {
+        self.chances.iter().map(|chance| chance.key())
+    }
+
     /// Removes blobs of which too little is left at a time.
     pub(crate) fn end(&mut self, gas: &Gas, time: f64) {
         let life = gas.life();

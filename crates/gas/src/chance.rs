@@ -18,6 +18,11 @@ impl Chance {
         Chance(self.0.of(key))
     }
 
+    /// A number that tells this source from others.
+    pub(crate) fn key(self) -> u64 {
+        self.0.key()
+    }
+
     /// Uniformly distributed in the open interval from 0 to 1.
     pub(crate) fn unit(self) -> f64 {
         self.0.unit()

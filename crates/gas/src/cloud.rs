@@ -70,6 +70,11 @@ impl Cloud {
         (0..self.len()).map(|blob| self.blobs.get(blob, &self.gas, self.time))
     }
 
+    /// For each of the [`blobs`](Cloud::blobs) a number that it has as long as it lasts, and no other. The parts of one that splits have others.
+    pub fn keys(&self) -> impl Iterator<Item = u64> {
+        self.blobs.keys()
+    }
+
     /// Mass of all blobs, in kg.
     pub fn mass(&self) -> f64 {
         self.blobs().map(|blob| blob.mass).sum()

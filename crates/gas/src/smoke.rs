@@ -28,6 +28,8 @@ pub struct Smoke {
 pub(crate) struct Puff {
     pub(crate) blob: Blob,
     look: u32,
+    /// Its place among the blobs as they were given.
+    number: u32,
 }
 
 /// Distance in standard deviations at which a blob ends: 1.5e-8 of its density at the centre.
@@ -76,11 +78,13 @@ impl Smoke {
         for (number, (look, blobs)) in gases.into_iter().enumerate() {
             look.check()?;
             looks.push(look);
-            let puff = |blob: Blob| Puff {
+            let first = puffs.len();
+            let puff = |(place, blob): (usize, Blob)| Puff {
                 blob: Blob { mass: blob.mass * look.extinction, ..blob },
                 look: number as u32,
+                number: (first + place) as u32,
             };
-            puffs.extend(blobs.into_iter().map(puff));
+            puffs.extend(blobs.into_iter().enumerate().map(puff));
         }
         let tree = Tree::new(&mut puffs, reach);
         Ok(Smoke { looks, puffs, colours: Vec::new(), tree, reach, intervals: INTERVALS })
@@ -152,6 +156,16 @@ impl Smoke {
     /// All blobs, each with the area that it hides, in m², as its mass.
     pub fn blobs(&self) -> impl Iterator<Item = &Blob> {
         self.puffs.iter().map(|puff| &puff.blob)
+    }
+
+    /// What each blob scatters and emits where it lets no light through (equation 24), gas by gas in the order in which they were given; black
+    /// if they have not been [lit](Smoke::lit).
+    pub fn colours(&self) -> Vec<[f64; 3]> {
+        let mut colours = vec![[0.0; 3]; self.puffs.len()];
+        for (puff, colour) in self.puffs.iter().zip(&self.colours) {
+            colours[puff.number as usize] = *colour;
+        }
+        colours
     }
 
     /// The blobs that a ray passes within a span.

@@ -4,11 +4,11 @@
 //! numbers have their sign in the lowest bit. First of every track
 //!
 //! ```text
-//! kind, outline / mesh / 0 / corners, first frame, frames after it, log₂ of the stride, samples,
+//! kind, outline / mesh / 0 / corners / mesh and corners, first frame, frames after it, log₂ of the stride, samples,
 //! finishes, and for each: frames since the one before, material + 1 or 0, variant
 //! ```
 //!
-//! (kind 0 is a stem, 1 a mesh, 2 a patch, 3 a polygon, 4 a mesh scaled by axis), then of every track, number by number, its samples: the first
+//! (kind 0 is a stem, 1 a mesh, 2 a patch, 3 a polygon, 4 a mesh scaled by axis, 5 a net), then of every track, number by number, its samples: the first
 //! as difference from the point before it, the second from the first, others from the line through the two before. Growth
 //! is smooth, so most of that is small. All of it is compressed (zlib, RFC 1950).
 
@@ -41,11 +41,17 @@ pub(super) fn tracks(recording: &Recording) -> (Vec<u8>, Vec<Vec<Spoke>>) {
             Form::Stretched(number) => (4, u64::from(number)),
             Form::Patch => (2, 0),
             Form::Polygon(corners) => (3, u64::from(corners)),
+            Form::Net(number, _) => (5, u64::from(number)),
         };
         let span = u64::from(track.last - track.first);
         let (first, stride) = (u64::from(track.first), u64::from(track.stride.trailing_zeros()));
         let finishes = track.finishes.len() as u64;
-        for number in [kind, detail, first, span, stride, track.len() as u64, finishes] {
+        natural(kind, &mut bytes);
+        natural(detail, &mut bytes);
+        if let Form::Net(_, corners) = track.form {
+            natural(u64::from(corners), &mut bytes);
+        }
+        for number in [first, span, stride, track.len() as u64, finishes] {
             natural(number, &mut bytes);
         }
         let mut before = track.first;
@@ -72,10 +78,14 @@ pub(super) fn tracks(recording: &Recording) -> (Vec<u8>, Vec<Vec<Spoke>>) {
             }
         }
     }
+    (compressed(&bytes), outlines)
+}
+
+pub(super) fn compressed(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
     // Memory takes whatever is written to it.
-    let _ = encoder.write_all(&bytes);
-    (encoder.finish().unwrap_or_default(), outlines)
+    let _ = encoder.write_all(bytes);
+    encoder.finish().unwrap_or_default()
 }
 
 /// The largest radius of a stem, in steps.
@@ -86,7 +96,7 @@ fn thickest(samples: &[i32]) -> f64 {
     squares.fold(0.0, f64::max).sqrt()
 }
 
-fn natural(mut number: u64, out: &mut Vec<u8>) {
+pub(super) fn natural(mut number: u64, out: &mut Vec<u8>) {
     while number >= 128 {
         out.push(number as u8 | 128);
         number >>= 7;
@@ -94,7 +104,7 @@ fn natural(mut number: u64, out: &mut Vec<u8>) {
     out.push(number as u8);
 }
 
-fn integer(number: i64, out: &mut Vec<u8>) {
+pub(super) fn integer(number: i64, out: &mut Vec<u8>) {
     natural(((number << 1) ^ (number >> 63)) as u64, out);
 }
 

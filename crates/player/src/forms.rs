@@ -61,6 +61,8 @@ pub struct MeshForm {
     pub places: Vec<[f64; 2]>,
     /// The picture on it.
     pub texture: Option<Texture>,
+    /// The corner of the mesh that each one is: those of several colours stand here more than once.
+    pub corners: Vec<u32>,
 }
 
 impl Forms {
@@ -70,6 +72,11 @@ impl Forms {
             Some(patches) => MeshSource::Patches(patches.clone(), surface.placement.largest()),
             None => MeshSource::Mesh(surface.mesh.clone()),
         })
+    }
+
+    /// The number of a mesh whose corners move by themselves.
+    pub(super) fn net(&mut self, mesh: &Arc<Mesh>) -> u32 {
+        self.take_mesh(MeshSource::Mesh(Arc::clone(mesh)))
     }
 
     fn take_mesh(&mut self, source: MeshSource) -> u32 {
@@ -111,7 +118,7 @@ impl Forms {
         let mut cuts = vec![None; theirs.cuts.len()];
         for item in &stage.items {
             match item.key.form {
-                Form::Mesh(number) | Form::Stretched(number) => {
+                Form::Mesh(number) | Form::Stretched(number) | Form::Net(number, _) => {
                     let source = &theirs.meshes[number as usize];
                     meshes[number as usize].get_or_insert_with(|| self.take_mesh(source.clone()));
                 }
@@ -155,6 +162,7 @@ impl Forms {
                         takes_tint: face.takes_tint,
                     });
                     form.places.extend(mesh.places.get(corner as usize));
+                    form.corners.push(corner);
                     (form.vertices.len() - 1) as u32
                 })
             }));

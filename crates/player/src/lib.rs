@@ -8,6 +8,7 @@
 //!   form; each thing is a few numbers that place its form. All of them are points or differences of points, so halfway
 //!   between two stages is halfway between their numbers.
 //! - [`Recording`]: stages over time, each thing followed by the lineage of its module.
+//! - [`Clouds`]: the blobs of gases in a recording.
 //! - [`page`]: the recording, a player and the shaders in one file that needs no network.
 //!
 //! The page makes the triangles of one instant (`page/geometry.js`). The shaders (`shaders/`) have no version line: it is prepended
@@ -42,6 +43,7 @@
 
 #![warn(missing_docs)]
 
+mod clouds;
 mod encode;
 mod error;
 mod forms;
@@ -53,6 +55,7 @@ mod track;
 #[cfg(feature = "viewer")]
 pub mod window;
 
+pub use clouds::Clouds;
 pub use error::Error;
 pub use forms::{Forms, MeshForm, MeshVertex};
 pub use history::{Happening, History};

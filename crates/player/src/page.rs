@@ -3,28 +3,41 @@
 //! The file has three parts that matter: the player and its shaders (`page/`, `shaders/`), a description of the recording as
 //! JSON, and its tracks (see `encode.rs`) in base64.
 
+use std::collections::HashSet;
+
 use serde_json::{Value, json};
 
+use super::clouds::STEP;
 use super::encode;
 use super::forms::MeshForm;
 use super::recording::Recording;
+use super::stage::Form;
+use super::track::Track;
 use dlsys_geometry::scene::{Material, Texture};
 use dlsys_render::{GENERATOR, Spoke};
 
 const PAGE: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/style.css");
 /// The scripts, each after those that it needs.
-const SCRIPTS: [&str; 5] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("page/recording.js"),
     include_str!("page/camera.js"),
     include_str!("page/geometry.js"),
+    include_str!("page/clouds.js"),
+    include_str!("page/sky.js"),
     include_str!("page/painter.js"),
     include_str!("page/player.js"),
 ];
 
 /// The shaders, by name; without a version, which depends on where they run.
-pub const SHADERS: [(&str, &str); 2] =
-    [("surface", include_str!("shaders/surface.vert")), ("light", include_str!("shaders/light.frag"))];
+pub const SHADERS: [(&str, &str); 6] = [
+    ("surface", include_str!("shaders/surface.vert")),
+    ("light", include_str!("shaders/light.frag")),
+    ("puff", include_str!("shaders/puff.vert")),
+    ("veil", include_str!("shaders/veil.frag")),
+    ("sky", include_str!("shaders/sky.vert")),
+    ("heaven", include_str!("shaders/sky.frag")),
+];
 
 /// The beginning of every page, by which it is told from files of other programs.
 pub const MARK: &str = "<!doctype html>\n<!-- dlsys view: a recorded plant -->\n";
@@ -66,11 +79,27 @@ fn escaped(text: &str) -> String {
 
 /// Everything but the tracks.
 fn description(recording: &Recording, outlines: &[Vec<Spoke>]) -> Value {
-    let Recording { history, palette, forms, .. } = recording;
+    let Recording { history, palette, forms, clouds, .. } = recording;
     let color = |material: &Material| material.color.to_string();
     let mut pictures: Vec<Texture> = Vec::new();
+    let net = |track: &Track| match track.form {
+        Form::Net(number, _) => Some(number as usize),
+        _ => None,
+    };
+    let nets: HashSet<usize> = recording.tracks.iter().filter_map(net).collect();
+    let placed = |track: &Track| match track.form {
+        Form::Mesh(number) | Form::Stretched(number) => Some(number as usize),
+        _ => None,
+    };
+    let placed: HashSet<usize> = recording.tracks.iter().filter_map(placed).collect();
     let meshes: Vec<Value> = (0..forms.meshes())
-        .map(|i| mesh(&forms.mesh_form(i, recording.accuracy, palette), &mut pictures))
+        .map(|i| {
+            mesh(
+                &forms.mesh_form(i, recording.accuracy, palette),
+                [placed.contains(&i), nets.contains(&i)],
+                &mut pictures,
+            )
+        })
         .collect();
     let pictures = pictures.iter().map(|texture| {
         json!({ "file": encode::base64(&texture.picture.file), "size": texture.picture.size(), "repeats": texture.repeats })
@@ -96,6 +125,8 @@ fn description(recording: &Recording, outlines: &[Vec<Spoke>]) -> Value {
         "meshes": meshes,
         "pictures": pictures.collect::<Vec<_>>(),
         "cuts": forms.cuts(),
+        "clouds": (!clouds.is_empty()).then(|| encode::base64(&encode::compressed(clouds.bytes()))),
+        "puffUnit": recording.unit * STEP,
         "unit": recording.unit,
         "extent": recording.extent,
         "size": [size.x, size.y, size.z],
@@ -131,8 +162,8 @@ fn spokes(outline: &[Spoke]) -> Vec<f64> {
 }
 
 /// Places in parts of the mesh's unit; colours as numbers, less one and negative where the thing's colour replaces them; the number of the picture, and where
-/// corners lie in that.
-fn mesh(form: &MeshForm, pictures: &mut Vec<Texture>) -> Value {
+/// corners lie in that. Of nets, the numbers of the corners of the mesh; their places are in the tracks.
+fn mesh(form: &MeshForm, [is_placed, is_net]: [bool; 2], pictures: &mut Vec<Texture>) -> Value {
     let vertices = &form.vertices;
     let flat = |of: &dyn Fn(usize) -> [f64; 3], decimals| {
         (0..vertices.len()).flat_map(of).map(|x| rounded(x, decimals)).collect::<Vec<_>>()
@@ -153,8 +184,9 @@ fn mesh(form: &MeshForm, pictures: &mut Vec<Texture>) -> Value {
     json!({
         "picture": picture,
         "pinned": pinned,
-        "places": flat(&|i| vertices[i].place.coords.into(), 6),
-        "normals": flat(&|i| vertices[i].normal.into(), 4),
+        "places": if is_placed { flat(&|i| vertices[i].place.coords.into(), 6) } else { Vec::new() },
+        "normals": if is_placed { flat(&|i| vertices[i].normal.into(), 4) } else { Vec::new() },
+        "corners": if is_net { &form.corners[..] } else { &[] },
         "colors": colors.collect::<Vec<_>>(),
         "triangles": form.triangles,
     })

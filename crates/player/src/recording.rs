@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::Error;
+use super::clouds::Clouds;
 use super::forms::Forms;
 use super::history::History;
 use super::stage::{Form, Item, Key, Stage};
@@ -32,6 +33,8 @@ pub struct Recording {
     pub forms: Forms,
     /// In the order in which things first appear.
     pub tracks: Vec<Track>,
+    /// The blobs of gases.
+    pub clouds: Clouds,
     /// Opposite corners of the box around everything, and their middle.
     pub bounds: [Point; 2],
     /// The middle of the bounds, in scene units.
@@ -80,6 +83,7 @@ impl Recorder {
             palette: blank.palette.clone(),
             forms: Forms::default(),
             tracks: Vec::new(),
+            clouds: Clouds::default(),
             bounds,
             centre: nalgebra::center(&bounds[0], &bounds[1]),
             extent,
@@ -101,6 +105,11 @@ impl Recorder {
         self.recording.surroundings = surroundings.clone();
     }
 
+    /// Sets how many blobs of gases are to be expected, before the first frame.
+    pub fn expect(&mut self, clouds: Clouds) {
+        self.recording.clouds = clouds;
+    }
+
     /// Takes in a frame. Times increase.
     ///
     /// # Errors
@@ -115,7 +124,9 @@ impl Recorder {
         for item in &stage.items {
             let Item { mut key, mut finish, .. } = *item;
             match &mut key.form {
-                Form::Mesh(number) | Form::Stretched(number) => *number = meshes[*number as usize],
+                Form::Mesh(number) | Form::Stretched(number) | Form::Net(number, _) => {
+                    *number = meshes[*number as usize]
+                }
                 Form::Polygon(_) => finish.variant = cuts[finish.variant as usize],
                 Form::Stem(_) | Form::Patch => {}
             }
@@ -143,6 +154,7 @@ impl Recorder {
             });
             track.samples.extend(steps);
         }
+        recording.clouds.add(&stage.puffs, recording.centre, recording.unit);
         self.numbers += stage.numbers.len();
         // What is left is gone.
         for (_, number) in std::mem::replace(&mut self.open, open) {
@@ -172,7 +184,7 @@ pub(super) fn is_point(form: Form, number: usize) -> bool {
     match form {
         Form::Stem(_) | Form::Mesh(_) => number % 9 < 3,
         Form::Stretched(_) => number < 3,
-        Form::Patch | Form::Polygon(_) => true,
+        Form::Patch | Form::Polygon(_) | Form::Net(..) => true,
     }
 }
 

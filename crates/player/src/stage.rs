@@ -7,12 +7,13 @@
 //! | a surface scaled by axis | where its origin and its three axes (of its sizes) come to lie |
 //! | a patch | 16 control points, row by row |
 //! | a polygon | its corners |
+//! | a net | the corners of its mesh |
 
 use std::collections::HashMap;
 
 use super::forms::Forms;
 use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene};
-use dlsys_render::{CrossSection, Fit, lengths};
+use dlsys_render::{CrossSection, Fit, Puff, lengths, puffs};
 
 /// What is placed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -27,6 +28,8 @@ pub enum Form {
     Patch,
     /// A polygon of so many corners.
     Polygon(u32),
+    /// A mesh, by its number among the [`Forms`], whose corners, so many, move by themselves: a sheet, or a piece of ground.
+    Net(u32, u32),
 }
 
 impl Form {
@@ -37,7 +40,7 @@ impl Form {
             Form::Mesh(_) => 9,
             Form::Stretched(_) => 12,
             Form::Patch => 48,
-            Form::Polygon(corners) => 3 * corners as usize,
+            Form::Polygon(corners) | Form::Net(_, corners) => 3 * corners as usize,
         }
     }
 }
@@ -59,7 +62,7 @@ pub struct Finish {
     /// `None`: each part of a mesh has its own.
     pub material: Option<MaterialId>,
     /// Of a stem: 1 if a dome closes its start, plus 2 if one closes its end. Of a polygon: how it is cut into
-    /// triangles, by its number among the [`Forms`].
+    /// triangles, by its number among the [`Forms`]. Of a mesh and of a net: 1 for ground, which the camera need not take in.
     pub variant: u32,
 }
 
@@ -83,6 +86,8 @@ pub struct Stage {
     pub numbers: Vec<f64>,
     /// What its things have in common.
     pub forms: Forms,
+    /// The blobs of gases, in light.
+    pub puffs: Vec<Puff>,
     counts: HashMap<(OwnerId, Form), u32>,
 }
 
@@ -115,17 +120,7 @@ impl Stage {
             self.begin(scene, polygon.owner, Form::Polygon(polygon.vertices.len() as u32), finish);
             self.place(&polygon.vertices);
         }
-        for surface in &scene.surfaces {
-            let placement = &surface.placement;
-            let number = self.forms.mesh(surface);
-            let (form, axes) =
-                if placement.is_uniform() { (Form::Mesh(number), 2) } else { (Form::Stretched(number), 3) };
-            self.begin(scene, surface.owner, form, Finish { material: surface.tint, variant: 0 });
-            self.numbers.extend(placement.origin.iter());
-            for (axis, scale) in placement.axes.iter().zip(placement.scales).take(axes) {
-                self.numbers.extend((axis * scale).iter());
-            }
-        }
+        self.set_surfaces(scene, 0);
         for patch in &scene.patches {
             self.begin(
                 scene,
@@ -134,6 +129,34 @@ impl Stage {
                 Finish { material: Some(patch.material), variant: 0 },
             );
             patch.net.iter().for_each(|row| self.place(row));
+        }
+        self.puffs = puffs(scene, fit, 1);
+    }
+
+    /// Adds ground to what is there: a scene of surfaces.
+    pub fn add_ground(&mut self, ground: &Scene) {
+        self.set_surfaces(ground, 1);
+    }
+
+    fn set_surfaces(&mut self, scene: &Scene, variant: u32) {
+        for surface in &scene.surfaces {
+            let placement = &surface.placement;
+            let finish = Finish { material: surface.tint, variant };
+            if let Some(rest) = &surface.rest {
+                let points = &surface.mesh.vertices;
+                let form = Form::Net(self.forms.net(rest), points.len() as u32);
+                self.begin(scene, surface.owner, form, finish);
+                self.numbers.extend(points.iter().flat_map(|p| <[f64; 3]>::from(placement.point(*p).coords)));
+                continue;
+            }
+            let number = self.forms.mesh(surface);
+            let (form, axes) =
+                if placement.is_uniform() { (Form::Mesh(number), 2) } else { (Form::Stretched(number), 3) };
+            self.begin(scene, surface.owner, form, finish);
+            self.numbers.extend(placement.origin.iter());
+            for (axis, scale) in placement.axes.iter().zip(placement.scales).take(axes) {
+                self.numbers.extend((axis * scale).iter());
+            }
         }
     }
 

@@ -108,6 +108,11 @@ impl Haze {
         })
     }
 
+    /// What each blob of the scene scatters and emits where it lets no light through, by channel, gas by gas.
+    pub(super) fn colours(&self) -> Vec<[f64; 3]> {
+        self.smoke.colours()
+    }
+
     /// The part of the sun's light that comes through the gas to a place.
     pub(super) fn sunlight(&self, at: Vector, towards: Vector) -> f64 {
         let ray = Ray { origin: at, direction: towards };

@@ -329,10 +329,11 @@ impl<'m> Gases<'m> {
     /// A gas with its blobs in scene units.
     fn gas(&self, declared: &model::Gas, cloud: &Cloud) -> Gas {
         let metre = self.place.units.length;
-        let blob = |blob: gas::Blob| Blob {
+        let blob = |(blob, key): (gas::Blob, u64)| Blob {
             centre: Point::from(blob.centre / metre),
             deviation: blob.variance.sqrt() / metre,
             mass: blob.mass / declared.mass,
+            key,
         };
         Gas {
             name: Arc::clone(&declared.name),
@@ -341,7 +342,7 @@ impl<'m> Gases<'m> {
             glow: declared.glow,
             area: declared.extinction * declared.mass / (metre * metre),
             size: declared.size / metre,
-            blobs: cloud.blobs().map(blob).collect(),
+            blobs: cloud.blobs().zip(cloud.keys()).map(blob).collect(),
         }
     }
 

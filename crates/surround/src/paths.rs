@@ -83,12 +83,25 @@ struct Drawn {
     balls: Vec<(Vector, f64)>,
 }
 
+impl Drawn {
+    /// The diagonal of the box around it.
+    fn diagonal(&self) -> f64 {
+        let first = self.balls.first().map_or(Vector::zeros(), |(point, _)| *point);
+        let (low, high) = self.balls.iter().fold((first, first), |(low, high), (point, radius)| {
+            (low.inf(&point.add_scalar(-radius)), high.sup(&point.add_scalar(*radius)))
+        });
+        (high - low).norm()
+    }
+}
+
 /// The solids of a tick so far.
 #[derive(Clone, Default)]
 pub(crate) struct Watch {
     first: Vec<Drawn>,
     /// The drawings at the other instants; `None` where there is none of as many points.
     later: Vec<[Option<Vec<Vector>>; 3]>,
+    /// The module that drew each solid last.
+    modules: Vec<u64>,
 }
 
 impl Watch {
@@ -138,6 +151,7 @@ impl Watch {
         }
         if instant == 0 {
             self.later = vec![Default::default(); drawn.len()];
+            self.modules = drawn.iter().map(|solid| solid.origin.lineage.id).collect();
             self.first = drawn;
             return Ok(());
         }
@@ -146,11 +160,31 @@ impl Watch {
         for solid in drawn {
             let first = descent.line(solid.origin.lineage.id).find_map(|id| known.get(&id));
             if let Some(&first) = first.filter(|first| self.first[**first].balls.len() == solid.balls.len()) {
-                let points = solid.balls.iter().map(|(point, _)| *point).collect();
-                self.later[first][instant - 1].get_or_insert(points);
+                if !self.is_put_elsewhere(first, &solid) {
+                    let points = solid.balls.iter().map(|(point, _)| *point).collect();
+                    self.later[first][instant - 1].get_or_insert(points);
+                    self.modules[first] = solid.origin.lineage.id;
+                }
             }
         }
         Ok(())
+    }
+
+    /// Whether a production has put a solid of this number further away than the diagonal of the box around it: then it is lifted, and has not passed what is
+    /// between. It is where it was until the tick is over.
+    fn is_put_elsewhere(&self, number: usize, solid: &Drawn) -> bool {
+        if self.modules[number] == solid.origin.lineage.id {
+            return false;
+        }
+        let most = solid.diagonal();
+        let moved =
+            |ways: &mut dyn Iterator<Item = Vector>| ways.fold(0.0, |most: f64, way| most.max(way.norm()));
+        let now = solid.balls.iter().map(|(point, _)| *point);
+        let way = match self.later[number].iter().rev().flatten().next() {
+            Some(points) => moved(&mut points.iter().zip(now).map(|(from, to)| to - from)),
+            None => moved(&mut self.first[number].balls.iter().zip(now).map(|((from, _), to)| to - from)),
+        };
+        way > most
     }
 
     /// The ways of all solids through a tick that begins at a time and has a length, in s. What is not drawn at an instant stays where it was before.

@@ -25,6 +25,11 @@ impl Draw {
         Draw(z ^ (z >> 31))
     }
 
+    /// A number that tells this source from others.
+    pub fn key(self) -> u64 {
+        self.0
+    }
+
     /// Uniformly distributed in the open interval from 0 to 1.
     pub fn unit(self) -> f64 {
         ((self.0 >> 12) as f64 + 0.5) / (1u64 << 52) as f64

@@ -40,6 +40,8 @@ pub struct Blob {
     pub deviation: f64,
     /// Its mass in parts of that of a new blob.
     pub mass: f64,
+    /// A number that it has as long as it lasts, and no other blob.
+    pub key: u64,
 }
 
 /// A gas with its blobs at an instant.

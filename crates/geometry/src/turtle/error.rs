@@ -76,6 +76,9 @@ pub enum ErrorKind {
     /// A sheet behind `@D`.
     #[error("it lets go of a sheet")]
     FreeSheet,
+    /// A sheet on stems that give way.
+    #[error("it places a sheet on stems that bend, and the sheet would stay where they are at rest")]
+    BentSheet,
     /// More patches have been begun than a frame may have.
     #[error("it begins more patches than a frame may have")]
     TooManyPatches,
@@ -116,6 +119,9 @@ impl ErrorKind {
             }
             ErrorKind::FreeSheet => {
                 "a sheet is held where its `pinned` says: place it outside the branch of `@D`".to_owned()
+            }
+            ErrorKind::BentSheet => {
+                "place it outside the branch of `@E`; what holds it is rigid, or a `solid` that the equations move".to_owned()
             }
             ErrorKind::TooManyPatches => {
                 "use the number of a patch again when it is drawn: `@PS(1)` forgets the patch 1 that was there".to_owned()

@@ -10,9 +10,11 @@ function dot(a, b) {
 class Camera {
   // `size`: sides of the box around everything, whose middle is the origin; in scene units. `points`: those that are
   // outermost in some direction, over the whole recording.
-  constructor(size, points) {
+  // `beyond`: how far from the origin something may be.
+  constructor(size, points, beyond) {
     this.size = size;
     this.points = points;
+    this.beyond = beyond;
     this.radius = Math.hypot(...size) / 2 || 1;
     this.perspective = true;
     this.look(0, 0);
@@ -83,7 +85,7 @@ class Camera {
     // Depth is counted from the target in the direction of the viewer, as in pictures.
     const view = [0, 1, 2].flatMap((i) => [right[i], up[i], towards[i], 0]);
     view.push(eye(right), eye(up), eye(towards), 1);
-    const far = this.radius + Math.hypot(...this.target) + reach;
+    const far = Math.max(this.radius, this.beyond) + Math.hypot(...this.target) + reach;
     let projection;
     if (this.perspective) {
       const [near, end] = [Math.max(distance - far, distance * 0.01), distance + far];

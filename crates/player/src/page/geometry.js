@@ -13,8 +13,9 @@ class Geometry {
     this.palette = recording.palette.map((hex) => bytesOf(parseInt(hex.slice(1), 16)));
     this.outlines = recording.outlines.map(tubeForm);
     this.hasPictures = recording.pictures.length > 0;
-    this.meshes = recording.meshes.map(({ places, normals, colors, triangles, picture, pinned }) => ({
+    this.meshes = recording.meshes.map(({ places, normals, colors, triangles, picture, pinned, corners }) => ({
       picture,
+      corners: Uint32Array.from(corners),
       pinned: Float32Array.from(pinned),
       places: Float32Array.from(places),
       normals: Float32Array.from(normals),
@@ -29,6 +30,7 @@ class Geometry {
     this.pins = new Float32Array(this.hasPictures ? PIN * 4096 : 0);
     this.triangles = new Uint32Array(3 * 4096);
     this.net = new Float32Array(64);
+    this.normals = new Float32Array(64);
     this.levels = new Uint8Array(8);
     this.column = new Float64Array(24);
   }
@@ -50,6 +52,7 @@ class Geometry {
       if (track.kind === 0) this.addStem(this.outlines[track.detail], look.variant, color);
       else if (track.kind === 1) this.addMesh(this.meshes[track.detail], color, look.material < 0);
       else if (track.kind === 2) this.addPatch(color);
+      else if (track.kind === NET) this.addNet(this.meshes[track.detail], color, look.material < 0, track.width);
       else if (track.kind === 4) this.addMesh(this.meshes[track.detail], color, look.material < 0, true);
       else this.addPolygon(track.detail, this.cuts[look.variant], color);
     }
@@ -165,14 +168,7 @@ class Geometry {
       ? [inverse(ax, ay, az), inverse(bx, by, bz), inverse(cx, cy, cz)]
       : [each, each, each];
     let at = this.begin(colors.length, triangles);
-    if (picture !== null) {
-      const { repeats } = this.recording.pictures[picture];
-      for (let i = 0, pin = PIN * (this.count - colors.length); i < colors.length; i++, pin += PIN) {
-        this.pins[pin] = pinned[2 * i];
-        this.pins[pin + 1] = pinned[2 * i + 1];
-        this.pins[pin + 2] = 2 * picture + (repeats ? 1 : 0);
-      }
-    }
+    this.pin(picture, pinned);
     for (let i = 0; i < colors.length; i++, at += CORNER) {
       const [x, y, z] = [places[3 * i], places[3 * i + 1], places[3 * i + 2]];
       const [p, q, r] = [normals[3 * i] * ea, normals[3 * i + 1] * eb, normals[3 * i + 2] * ec];
@@ -186,6 +182,44 @@ class Geometry {
         az * p + bz * q + cz * r,
         plain || !tinted[i] ? colors[i] : color,
       );
+    }
+  }
+
+  // A mesh whose corners are where the numbers say; its normals are means of those of its faces, weighted by area.
+  addNet({ colors, tinted, triangles, corners, picture, pinned }, color, plain, width) {
+    const { net } = this;
+    if (this.normals.length < width) this.normals = new Float32Array(2 * width);
+    const { normals } = this;
+    normals.fill(0, 0, width);
+    for (let i = 0; i < triangles.length; i += 3) {
+      const [p, q, r] = [3 * corners[triangles[i]], 3 * corners[triangles[i + 1]], 3 * corners[triangles[i + 2]]];
+      const ax = net[q] - net[p], ay = net[q + 1] - net[p + 1], az = net[q + 2] - net[p + 2];
+      const bx = net[r] - net[p], by = net[r + 1] - net[p + 1], bz = net[r + 2] - net[p + 2];
+      const x = ay * bz - az * by, y = az * bx - ax * bz, z = ax * by - ay * bx;
+      for (const corner of [p, q, r]) {
+        normals[corner] += x;
+        normals[corner + 1] += y;
+        normals[corner + 2] += z;
+      }
+    }
+    let at = this.begin(colors.length, triangles);
+    this.pin(picture, pinned);
+    for (let i = 0; i < colors.length; i++, at += CORNER) {
+      const k = 3 * corners[i];
+      const [x, y, z] = [normals[k], normals[k + 1], normals[k + 2]];
+      const each = 1 / (Math.sqrt(x * x + y * y + z * z) || 1);
+      this.put(at, net[k], net[k + 1], net[k + 2], x * each, y * each, z * each, plain || !tinted[i] ? colors[i] : color);
+    }
+  }
+
+  // Where the corners that were added last lie in a picture, if there is one.
+  pin(picture, pinned) {
+    if (picture === null) return;
+    const { repeats } = this.recording.pictures[picture];
+    for (let i = 0, pin = PIN * this.count - (PIN * pinned.length) / 2; i < pinned.length; i += 2, pin += PIN) {
+      this.pins[pin] = pinned[i];
+      this.pins[pin + 1] = pinned[i + 1];
+      this.pins[pin + 2] = 2 * picture + (repeats ? 1 : 0);
     }
   }
 

@@ -47,6 +47,9 @@ class Painter {
     }
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.enable(gl.DEPTH_TEST);
+    const compiled = (vertex, fragment) => this.compiled(vertex, fragment);
+    this.veil = recording.clouds ? new Veil(gl, recording, compiled) : null;
+    this.sky = recording.light?.sky ? new Sky(gl, recording, compiled) : null;
     gl.clearColor(...BACKGROUND, 1);
   }
 
@@ -108,6 +111,7 @@ class Painter {
     }
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, geometry.triangles.subarray(0, geometry.used), gl.STREAM_DRAW);
     this.triangles = geometry.used / 3;
+    this.veil?.stage(frame);
   }
 
   // The declared light, in the directions of the view; its shadows are in pictures only.
@@ -116,7 +120,7 @@ class Painter {
     const { light } = this.recording;
     if (!light) return gl.uniform3f(places.tint, -1, 0, 0);
     const seen = ([x, y, z]) => [0, 1, 2].map((i) => view[i] * x + view[4 + i] * y + view[8 + i] * z);
-    const [zenith, horizon] = (light.sky || ["#b4cdf0", "#f2efe8"]).map((hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255));
+    const [zenith, horizon] = (light.sky || ["#b4cdf0", "#f2efe8"]).map(channelsOf);
     const mean = zenith.map((c, i) => 0.6 * c + 0.4 * horizon[i]);
     gl.uniform3fv(places.sun, light.sun ? seen(light.sun) : [0, 0, 0]);
     gl.uniform3fv(places.zenith, seen([0, 1, 0]));
@@ -132,6 +136,8 @@ class Painter {
     const depth = Math.min(...size);
     gl.viewport(0, 0, width, height);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    this.sky?.paint(view, camera.perspective);
+    gl.useProgram(this.program);
     gl.uniformMatrix4fv(places.view, false, view);
     gl.uniformMatrix4fv(places.projection, false, projection);
     // Drawings without depth are diagrams: their colours mean something.
@@ -140,5 +146,6 @@ class Painter {
     gl.uniform1f(places.near, near);
     this.light(view);
     gl.drawElements(gl.TRIANGLES, 3 * this.triangles, gl.UNSIGNED_INT, 0);
+    this.veil?.paint(view, projection);
   }
 }

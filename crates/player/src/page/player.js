@@ -29,6 +29,7 @@ class Player {
     this.camera = new Camera(
       size.map((side) => side * extent),
       outermost(recording),
+      reachOfGround(recording),
     );
     if (recording.camera) this.camera.look(...recording.camera);
     this.painter = new Painter(this.elements.plant, recording);
@@ -48,7 +49,10 @@ class Player {
 
   describe() {
     const { recording, elements } = this;
-    const empty = recording.tracks.length === 0;
+    const { sky } = recording.light ?? {};
+    // The title stands before the zenith.
+    document.body.classList.toggle("night", Boolean(sky) && channelsOf(sky[0]).reduce((sum, c) => sum + c) < 1.4);
+    const empty = recording.tracks.length === 0 && !recording.clouds;
     elements.notice.hidden = !empty;
     elements.notice.style.display = empty ? "" : "none";
     elements.notice.textContent = "Nothing is drawn in this recording: the turtle knows none of its modules, nor does an “interpret” rule say what they look like.";
@@ -402,6 +406,7 @@ function shown(time) {
   try {
     const recording = JSON.parse(part("description"));
     recording.tracks = decodeTracks(await inflated(part("tracks")), recording.unit);
+    if (recording.clouds) recording.clouds = new Clouds(await inflated(recording.clouds), recording.times.length, recording.puffUnit);
     // For whoever wants to steer it from outside: dlsys.seek(2), dlsys.play(), dlsys.look(30, 20).
     const player = new Player(recording);
     await player.painter.unpack();

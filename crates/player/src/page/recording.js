@@ -1,7 +1,8 @@
 // The recording: tracks out of their bytes, and what is to be seen at any time.
 
-// Numbers that place a thing, by kind: stem, mesh, patch, polygon (three for each corner), mesh scaled by axis.
-const WIDTHS = [18, 9, 48, undefined, 12];
+// Numbers that place a thing, by kind: stem, mesh, patch, polygon and net (three for each corner), mesh scaled by axis.
+const WIDTHS = [18, 9, 48, undefined, 12, undefined];
+const NET = 5;
 
 async function inflated(text) {
   const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -31,11 +32,13 @@ function reader(bytes) {
 function decodeTracks(bytes, unit) {
   const { natural, integer } = reader(bytes);
   const tracks = Array.from({ length: natural() }, () => {
-    const [kind, detail, first, span, log2] = [natural(), natural(), natural(), natural(), natural()];
+    const [kind, detail] = [natural(), natural()];
+    const corners = kind === NET ? natural() : detail;
+    const [first, span, log2] = [natural(), natural(), natural()];
     const [length, looks] = [natural(), natural()];
     let frame = first;
     const track = { kind, detail, first, last: first + span, stride: 2 ** log2, length };
-    track.width = WIDTHS[kind] ?? 3 * detail;
+    track.width = WIDTHS[kind] ?? 3 * corners;
     track.full = Math.ceil(span / track.stride) + 1;
     track.looks = Array.from({ length: looks }, () => {
       frame += natural();
@@ -48,7 +51,7 @@ function decodeTracks(bytes, unit) {
     const samples = (track.samples = new Float32Array(width * length));
     const firsts = new Array(width).fill(0);
     for (let number = 0; number < width; number++) {
-      const near = number >= 3 && (kind === 2 || kind === 3) ? firsts[number - 3] : 0;
+      const near = number >= 3 && (kind === 2 || kind === 3 || kind === NET) ? firsts[number - 3] : 0;
       let before = near + integer(), rate = 0;
       firsts[number] = before;
       samples[number] = before * unit;
@@ -120,9 +123,24 @@ function outline(count) {
   return { take, points: () => best.flatMap(([, point]) => (point ? [point] : [])) };
 }
 
-// The points of a recording that are outermost in some direction, over all its frames: what the camera fits into the
-// page. The box around everything would leave the page half empty.
-function outermost({ tracks, meshes }) {
+// Whether a track is ground, which reaches as far as it is declared.
+function isGround({ kind, looks }) {
+  return (kind === 1 || kind === NET) && looks[0].variant === 1;
+}
+
+// How far ground is from the middle of the recording, at most.
+function reachOfGround({ tracks }) {
+  let most = 0;
+  for (const { samples } of tracks.filter((track) => track.kind === NET && isGround(track))) {
+    for (let k = 0; k < samples.length; k += 3) most = Math.max(most, Math.hypot(samples[k], samples[k + 1], samples[k + 2]));
+  }
+  return most;
+}
+
+// The points of a recording that are outermost in some direction, over all its frames, ground left out: what the camera fits into
+// the page. The box around everything would leave the page half empty.
+function outermost({ tracks: all_tracks, meshes, clouds }) {
+  const tracks = all_tracks.filter((track) => !isGround(track));
   const all = outline(200);
   const shapes = meshes.map(({ places }) => {
     const shape = outline(40);
@@ -152,6 +170,7 @@ function outermost({ tracks, meshes }) {
       }
     }
   }
+  for (const [x, y, z, radius] of clouds ? clouds.outermost(10000) : []) all.take(x, y, z, radius);
   return all.points();
 }
 

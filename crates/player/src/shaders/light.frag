@@ -65,7 +65,8 @@ void main() {
         float cosine = dot(normal, LAMP);
         // What is closed shows no side that light comes through.
         float diffuse = (max(cosine + WRAP, 0.0) - (LAMP.z + WRAP)) / (1.0 + WRAP) + TRANSMITTED * max(-cosine, 0.0);
-        strength = 1.0 - falloff * max(near - seen.z, 0.0) + relief * (DIFFUSE * diffuse + ABOVE * normal.y + GLOSS * gloss);
+        // Ground goes on behind the plant.
+        strength = 1.0 - min(falloff * max(near - seen.z, 0.0), 0.25) + relief * (DIFFUSE * diffuse + ABOVE * normal.y + GLOSS * gloss);
     } else {
         bool has_sun = dot(sun, sun) > 0.0;
         float up = dot(normal, zenith);

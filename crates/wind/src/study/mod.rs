@@ -102,20 +102,36 @@ fn place(draw: Draw) -> Vector3<f64> {
 pub fn statistics(seeds: u64) -> Result<Vec<Row>, Error> {
     let seeds = seeds.max(1);
     let (mut rows, first) = (Vec::new(), von_karman(0)?);
-    // One field at a time: each takes some megabytes.
-    let (mut variances, mut shells, mut lines) =
-        (Variances::default(), Shells::new(&first), Lines::default());
-    for seed in 0..seeds {
-        let field = von_karman(seed)?;
-        variances.add(&field, seed)?;
-        shells.add(&field)?;
-        lines.add(&field, seed)?;
-    }
+    // Samples on one thread, amplitudes on another; on each, one field at a time, which takes some megabytes, in the order of the seeds.
+    let sampled = || {
+        let (mut variances, mut lines) = (Variances::default(), Lines::default());
+        for seed in 0..seeds {
+            let field = von_karman(seed)?;
+            variances.add(&field, seed)?;
+            lines.add(&field, seed)?;
+        }
+        Ok::<_, Error>((variances, lines))
+    };
+    let by_modes = || {
+        let (mut shells, mut paper) = (Shells::new(&first), Vec::new());
+        for seed in 0..seeds {
+            shells.add(&von_karman(seed)?)?;
+        }
+        of_paper(seeds, &mut paper)?;
+        Ok::<_, Error>((shells, paper))
+    };
+    let (sampled, modes) = std::thread::scope(|scope| {
+        let sampled = scope.spawn(sampled);
+        let modes = by_modes();
+        (sampled.join(), modes)
+    });
+    let (variances, lines) = sampled.unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+    let (shells, paper) = modes?;
     variances.rows(&first, &mut rows)?;
     shells.rows(&mut rows);
     lines.rows(&first, &mut rows);
     divergence(&first, &mut rows)?;
-    of_paper(seeds, &mut rows)?;
+    rows.extend(paper);
     Ok(rows)
 }
 

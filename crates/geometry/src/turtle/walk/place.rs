@@ -124,6 +124,10 @@ impl Walk<'_> {
         if self.state.part.is_some() {
             return Err(self.error(ErrorKind::FreeSheet));
         }
+        // Behind `@E(0)`, too, what bends is below.
+        if self.state.tissue.or(self.state.rigid).is_some() {
+            return Err(self.error(ErrorKind::BentSheet));
+        }
         let DrawnModule { kind, lineage } = self.drawn;
         let key = SheetKey { module: lineage.id, number: self.sheets_drawn };
         self.sheets_drawn += 1;
