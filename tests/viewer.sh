@@ -118,7 +118,7 @@ played=$(open models/lychnis.dls "" '
 echo "Lychnis:"
 echo "$played"
 
-# Stems and meshes, patches, lines, polygons by the thousand, nothing at all; orbit and every key.
+# Stems and meshes, patches, lines, polygons by the thousand, a sheet, gas, ground, nothing at all; orbit and every key.
 others='
   const player = window.dlsys, canvas = document.getElementById("plant");
   const colours = () => {
@@ -137,12 +137,13 @@ others='
   say(`${colours()} colours, ${player.painter.triangles} triangles, "${document.getElementById("clock").textContent}"`);
   const error = player.painter.gl.getError();
   if (error) throw new Error(`WebGL error ${error}`);
-  const drawn = player.recording.tracks.length > 0;
+  const drawn = player.recording.tracks.length > 0 || Boolean(player.recording.clouds);
   if (drawn !== colours() > 1) throw new Error(drawn ? "nothing is to be seen" : "something is to be seen");
   if (drawn === document.getElementById("notice").checkVisibility()) throw new Error("the notice is wrong");'
 printf 'initial string: A(1)\nA(x): solve dx/dt = 1\nframes 0 .. 1 step 0.1\n' > "$work/unseen.dls"
-for model in models/leaf.dls models/campanula.dls models/anabaena.dls models/petal.dls models/abop/koch-island.dls "$work/unseen.dls"; do
+for model in models/leaf.dls models/campanula.dls models/anabaena.dls models/petal.dls models/abop/koch-island.dls models/scenes/{flag,smoke,steps-sand}.dls "$work/unseen.dls"; do
     extra=
+    case $model in models/scenes/*) extra="--from 0 --to 2 --step 0.25" ;; esac
     [ "$model" != models/campanula.dls ] || extra="--from 0 --to 20 --step 0.5"
     said=$(open "$model" "$extra" "$others") || { echo "$said"; exit 1; }
     echo "$(basename "$model" .dls): $said" | sed '/done$/d'
