@@ -57,6 +57,19 @@ pub(crate) struct Track {
     pub(crate) steps: Vec<(f64, State)>,
     /// What it does to the solids that sheets push, by their modules.
     pub(crate) forces: Vec<(u64, Line)>,
+    /// Impulses in N s on solids, by their numbers among the paths.
+    pub(crate) pushes: Vec<(usize, Vector)>,
+}
+
+/// A solid that passes through a part of a tick.
+#[derive(Clone, Debug)]
+pub(crate) struct Passage {
+    /// The module that draws it where the part begins.
+    pub(crate) origin: Origin,
+    /// Its size in m: twice the largest distance of a point from its centre.
+    pub(crate) size: f64,
+    /// Where it is at the beginning and at the end.
+    pub(crate) ends: [Stand; 2],
 }
 
 impl Track {
@@ -94,6 +107,8 @@ pub(crate) struct Part {
     pub(crate) descent: Descent,
     /// What sheets do to solids whose rules read it, by the module at the beginning.
     pub(crate) forces: BTreeMap<u64, Line>,
+    /// Where the solids go, if that is noted.
+    pub(crate) passages: Vec<Passage>,
 }
 
 impl Tick {
@@ -141,6 +156,8 @@ pub(crate) struct Hanging<'m> {
     pub(crate) hung: Vec<Hanger>,
     /// Where rules read the forces on solids.
     leading: Option<Leading>,
+    /// Parts have the ways of solids.
+    notes: bool,
     /// The kinds that place sheets.
     drapers: Arc<[bool]>,
     /// A drawing that places a sheet may do so at one time and not at another.
@@ -165,7 +182,31 @@ impl<'m> Hanging<'m> {
         let solver = Solver::new(Settings { tolerance, longest: TICK, ..Settings::default() });
         let (hung, scene) = (Vec::new(), turtle::blank(model));
         let leading = model.reads_force().then(Leading::default);
-        Hanging { model, place, growth, number: 0, hung, leading, drapers, chooses, wind, solver, scene }
+        let notes = false;
+        Hanging {
+            model,
+            place,
+            growth,
+            number: 0,
+            hung,
+            leading,
+            notes,
+            drapers,
+            chooses,
+            wind,
+            solver,
+            scene,
+        }
+    }
+
+    /// The same with solids on other ways: those of growth under no force, or, with this, under the forces of sheets. Parts have the ways of solids.
+    pub(crate) fn noted(self, leading: Option<Leading>) -> Hanging<'m> {
+        Hanging { leading, notes: true, ..self }
+    }
+
+    /// What solids are under the forces of sheets, if they are.
+    pub(crate) fn leading(&self) -> Option<&Leading> {
+        self.leading.as_ref()
     }
 
     /// Sets when the solver gives up.
@@ -388,16 +429,19 @@ impl<'m> Hanging<'m> {
     ) -> Result<Track, Error> {
         let from = hung.begin.max(span.start);
         let mut steps = vec![(from, state.clone())];
+        let mut impulses = vec![Vector::zeros(); solids.len()];
         if from < span.end {
             let wind = Gusts(&self.wind);
             let note = |step: &Step| {
                 steps.push((step.to, step.after.clone()));
+                impulses.iter_mut().zip(step.pushes).for_each(|(sum, push)| *sum += push.impulse);
                 observe(step);
             };
             let done = self.solver.advance(&hung.made, &mut state, from..span.end, solids, &wind, note);
             done.map_err(|error| self.failed(&hung, error))?;
         }
-        Ok(Track { hung, steps, forces: Vec::new() })
+        let pushes = impulses.into_iter().enumerate().filter(|(_, impulse)| *impulse != Vector::zeros());
+        Ok(Track { hung, steps, forces: Vec::new(), pushes: pushes.collect() })
     }
 
     /// A sheet that cannot be followed.
@@ -442,7 +486,13 @@ impl<'m> Hanging<'m> {
         }
         self.hung = hung;
         self.growth = growth;
-        let part = Part { end: begin + length, tracks, descent: view.descent, forces };
+        let ends = [begin, begin + length];
+        let passage = |path: &Path| {
+            let (origin, size) = (path.origin, 2.0 * path.shape.reach());
+            Passage { origin, size, ends: ends.map(|time| path.place(time)) }
+        };
+        let passages = if self.notes { view.paths.iter().map(passage).collect() } else { Vec::new() };
+        let part = Part { end: begin + length, tracks, descent: view.descent, forces, passages };
         (part, view.failed)
     }
 }
