@@ -13,9 +13,9 @@ use dlsys_model::KindId;
 use dlsys_sheet::{Matrix, Vector};
 
 use crate::descent::Descent;
-use crate::hanging::Passage;
 use crate::line::{Exerted, Line};
 use crate::paths::{INSTANTS, Path};
+use crate::tracks::Passage;
 
 /// The masses of some kinds of solids, and where the solids are beyond the places that growth gives them.
 #[derive(Clone, Debug, Default)]

@@ -23,10 +23,11 @@ use crate::Error;
 use crate::afloat::Afloat;
 use crate::descent::Descent;
 use crate::error::CouplingFault;
-use crate::hanging::{Hanger, Hanging, Part, TICK, Track, View};
+use crate::hanging::{Hanger, Hanging, TICK, View};
 use crate::line::{Exerted, Line};
 use crate::masses::Body;
 use crate::paths::{INSTANTS, Path};
+use crate::tracks::{Part, Track};
 
 /// Most halvings of a tick.
 const DEEPEST: u32 = 14;

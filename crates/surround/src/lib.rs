@@ -51,6 +51,7 @@ mod sheets;
 mod solids;
 mod survey;
 mod terrain;
+mod tracks;
 mod trial;
 mod weather;
 

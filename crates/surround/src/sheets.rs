@@ -14,10 +14,11 @@ use dlsys_sim::{Settings, Simulation};
 
 use crate::Error;
 use crate::coupled;
-use crate::hanging::{Hanging, TICK, Tick, matched};
+use crate::hanging::{Hanging, TICK, matched};
 use crate::marks::{Marks, Recent};
 use crate::motion::MOST_TICKS;
 use crate::place::Place;
+use crate::tracks::Tick;
 use crate::weather::{Sampler, Weather};
 
 /// Most points of the ticks that are kept for times that come a little late, and of marks.

@@ -15,11 +15,12 @@ use dlsys_tree::Lineage;
 
 use crate::Error;
 use crate::descent::Descent;
-use crate::hanging::{Hanging, Passage, TICK, Tick, Track};
+use crate::hanging::{Hanging, TICK};
 use crate::leading::Leading;
 use crate::motion::MOST_TICKS;
 use crate::place::Place;
 use crate::sheets;
+use crate::tracks::{Passage, Tick, Track};
 
 /// On which ways solids go.
 #[derive(Clone, Debug, PartialEq)]
