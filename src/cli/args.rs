@@ -12,7 +12,8 @@ use super::shared::Topology;
 use super::shared::{BudgetArgs, RunFormat, SharedArgs, SolverArgs, TextFormat};
 use super::shell::{self, CompletionsArgs, ManArgs};
 use super::values::{
-    Seeds, figure, frame_format, method, positive, runs, seeds, setting, threads, time, tolerance,
+    Seeds, bend_tolerance, figure, frame_format, limit, mass, method, positive, runs, seeds, setting,
+    threads, time, tolerance,
 };
 use super::verify::VerifyArgs;
 use crate::compile::Setting;
@@ -314,7 +315,7 @@ pub struct ReportArgs {
     #[arg(value_name = "MODEL", required_unless_present_any = ["hard", "surroundings"], conflicts_with_all = ["hard", "surroundings"])]
     pub models: Vec<PathBuf>,
     /// Directory for NAME.csv, NAME.json and the plot NAME.svg, with tissues also NAME-stems.csv (with --hard: hard.csv,
-    /// hard.json; with --surroundings: surroundings.csv); made if it is not there
+    /// hard.json; with --surroundings: surroundings.csv; with --coupling: NAME-coupling.csv, NAME-coupling.json); made if it is not there
     #[arg(short, long = "out", value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Methods to compare, in this order [default: all; with --hard those that each case names]
@@ -369,6 +370,23 @@ pub struct ReportArgs {
     /// with errors and orders, hard cases, error against work of the implicit methods, and speed. Exit status 1 if a statistic is out of its bound or a hard case fails
     #[arg(long, conflicts_with_all = ["hard", "verify", "methods", "tolerances", "step_sizes", "slices", "at", "from", "settings"])]
     pub surroundings: bool,
+    /// Instead of the study: forces and accelerations by sheets on the solids of a model, what one-way, two-way and hybrid coupling cost in time and
+    /// in error of the solids' motion, and which of them serves, as in the decision tree of O'Brien, Zordan and Hodgins; also what stems do to what holds them
+    #[arg(long, conflicts_with_all = ["hard", "surroundings", "verify", "methods", "tolerances", "step_sizes", "slices"])]
+    pub coupling: bool,
+    /// With --coupling, the mass in kg of the solids of a name whose rules read no force: it tells accelerations, and what both ways would do; can be repeated
+    #[arg(long = "mass", value_name = "NAME=KG", value_parser = mass, requires = "coupling")]
+    pub masses: Vec<(String, f64)>,
+    /// With --coupling, the value of a `param` that takes the stand-in for a passive part out of the rules of a hybrid model; can be repeated
+    #[arg(long = "without", value_name = "NAME=VALUE", value_parser = setting, requires = "coupling")]
+    pub without: Vec<Setting>,
+    /// With --coupling, a limit of the decision; can be repeated. Accelerations below `negligible` (1 m/s²) are, and so are those below `overwhelmed` (0.1) of
+    /// all others, and motions that differ by less than `unseen` (0.05) of the size; a sheet may be stretched by `stretch` (0.3), and both ways may take `patience` (60 s)
+    #[arg(long = "limit", value_name = "NAME=VALUE", value_parser = limit, requires = "coupling")]
+    pub limits: Vec<(String, f64)>,
+    /// Largest error of a step of stems and sheets with --coupling, relative to the extent
+    #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-3", value_parser = bend_tolerance, requires = "coupling")]
+    pub bend_tolerance: f64,
     /// With --hard, run only the case of this name; can be repeated
     #[arg(long = "case", value_name = "ID")]
     pub cases: Vec<String>,

@@ -39,7 +39,10 @@ pub fn run(session: &Session, words: &[String]) -> Result<(), Failure> {
         Action::Report(args) => {
             let stem = std::path::Path::new(&session.source.name).file_stem();
             let name = stem.map_or("model".to_owned(), |s| s.to_string_lossy().into_owned());
-            report::study(args, session, &name)
+            match report::of(args, (None, session), &name)? {
+                true => Ok(()),
+                false => Err(Failure::Model(format!("error: {name} not verified\n"))),
+            }
         }
         _ => Err(Failure::Usage(format!("error: `{}` is no command of a session\n", words[0]))),
     }

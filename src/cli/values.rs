@@ -8,6 +8,7 @@ use crate::interchange;
 use crate::render::{Camera, Format, Layout, Page};
 use crate::scene::{Color, Point, Vector, Viewpoint};
 use crate::sim::{BendMethod, Method, brief};
+use crate::study::Thresholds;
 
 /// A format for frames.
 pub(super) fn frame_format() -> impl TypedValueParser<Value = Format> {
@@ -307,6 +308,26 @@ pub(super) fn runs(text: &str) -> Result<usize, String> {
 pub(super) fn setting(text: &str) -> Result<Setting, String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
     Ok(Setting { name: name.trim().to_owned(), value: number(value)? })
+}
+
+/// A name with a number that is greater than 0.
+fn named(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=VALUE")?;
+    Ok((name.trim().to_owned(), positive(value)?))
+}
+
+/// The mass of the solids of a name, in kg.
+pub(super) fn mass(text: &str) -> Result<(String, f64), String> {
+    named(text)
+}
+
+/// A limit of the decision of `report --coupling`.
+pub(super) fn limit(text: &str) -> Result<(String, f64), String> {
+    let (name, value) = named(text)?;
+    match Thresholds::NAMES.contains(&&*name) {
+        true => Ok((name, value)),
+        false => Err(format!("limits are {}", Thresholds::NAMES.join(", "))),
+    }
 }
 
 pub(super) fn method(text: &str) -> Result<Method, String> {

@@ -11,6 +11,7 @@ mod chance;
 mod cli;
 mod common;
 mod corners;
+mod coupled;
 mod coupling;
 mod dice;
 mod discrete;

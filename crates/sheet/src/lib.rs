@@ -82,7 +82,7 @@ pub use drag::Air;
 pub use error::{Error, Rejection};
 pub use mesh::{MOST_POINTS, Mesh, Tissue};
 pub use run::Run;
-pub use settings::Settings;
+pub use settings::{Method, Settings};
 pub use sheet::Sheet;
 pub use solver::{Counts, Solver};
 pub use state::{Energy, State, Step};

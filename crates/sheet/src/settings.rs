@@ -3,9 +3,21 @@
 use crate::error::check;
 use crate::{Air, Error};
 
+/// How a state is advanced where nothing begins or ends to touch; there, both are steps of backward Euler.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// Two stages, of order 2 and L-stable (Alexander 1977).
+    #[default]
+    Sdirk2,
+    /// Two steps of backward Euler, of order 1: for comparison.
+    Euler,
+}
+
 /// How a solver works.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
+    /// The method.
+    pub method: Method,
     /// Largest error of a step: displacement of any point relative to the extent of the sheet. The error of the velocity counts as the
     /// displacement that it makes in the longest step.
     pub tolerance: f64,
@@ -27,6 +39,7 @@ impl Default for Settings {
     /// A tolerance of 1e-3 and steps of 1/60 s at most.
     fn default() -> Settings {
         Settings {
+            method: Method::default(),
             tolerance: 1e-3,
             longest: 1.0 / 60.0,
             deepest: 24,

@@ -15,7 +15,7 @@
 use crate::contact::{Contact, Impact, Moving};
 use crate::solve::Free;
 use crate::stage::{Base, Newton, touching};
-use crate::{Drive, Matrix, Place, Push, Rejection, Settings, Sheet, Solid, State, Vector, Wind};
+use crate::{Drive, Matrix, Method, Place, Push, Rejection, Settings, Sheet, Solid, State, Vector, Wind};
 
 /// γ: 1 - 1/√2.
 const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
@@ -166,7 +166,7 @@ impl Workspace {
             .zip(&self.newton.free)
             .map(|(body, free)| free.inertia * body.spin)
             .collect();
-        self.euler = self.touching[0] != self.touching[1];
+        self.euler = around.settings.method == Method::Euler || self.touching[0] != self.touching[1];
         if !self.euler {
             let gain = (1.0 - GAMMA) / GAMMA;
             for k in 0..sheet.len() {

@@ -1,7 +1,7 @@
 //! The exact cases: errors and orders of the study.
 
 use dlsys_sheet::study::{self, Coupling};
-use dlsys_sheet::{Error, Settings};
+use dlsys_sheet::{Error, Method, Settings};
 use dlsys_wind::study::Convergence;
 
 /// Errors fall from row to row, and the last one of a case is below `most`.
@@ -107,5 +107,40 @@ fn nothing_passes_through_a_sheet() -> Result<(), Error> {
         }
     }
     assert!(touched > 15 && failed.is_empty(), "{touched} {failed:#?}");
+    Ok(())
+}
+
+/// The method of order 2 is nearer with as many steps, and each gets nearer with the tolerance.
+#[test]
+fn the_method_of_order_two_is_worth_its_work() -> Result<(), Error> {
+    let rows = study::methods(&study::METHOD_CASES[0])?;
+    let (two, one) = rows.split_at(3);
+    assert!(
+        two.iter().all(|row| row.method == Method::Sdirk2)
+            && one.iter().all(|row| row.method == Method::Euler)
+    );
+    for pair in two.windows(2).chain(one.windows(2)) {
+        assert!(pair[1].error < 0.5 * pair[0].error && pair[1].steps[0] > pair[0].steps[0], "{pair:?}");
+    }
+    for (two, one) in two.iter().zip(one) {
+        assert!(two.error < 0.3 * one.error && two.steps[0] < 2 * one.steps[0], "{two:?} {one:?}");
+    }
+    assert!(two[2].error < 1e-4 && one[2].error > 1e-3, "{rows:?}");
+    Ok(())
+}
+
+/// One way, nets are driven to several times their length; both ways, they are hit at a hundred lengths a frame.
+#[test]
+fn nets_that_are_driven_too_far_stay_stable() -> Result<(), Error> {
+    for case in study::hard_cases()? {
+        assert!(case.failure.is_none(), "{case:?}");
+        assert!(case.steps[0] + case.steps[1] < 20_000, "{case:?}");
+        if case.case.contains("held") {
+            assert!(
+                case.moved[0] > 1.0 && (case.moved[1] - case.moved[0]).abs() < 0.2 * case.moved[0],
+                "{case:?}"
+            );
+        }
+    }
     Ok(())
 }

@@ -80,7 +80,7 @@ fn fields(study: &Study, series: &Series, point: &Point) -> [String; 20] {
 }
 
 /// One line; fields in quotation marks where they need them.
-fn line<const N: usize>(fields: [String; N]) -> String {
+pub(super) fn line<const N: usize>(fields: [String; N]) -> String {
     let quoted = fields.map(|field| match field.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", field.replace('"', "\"\"")),
         false => field,

@@ -15,6 +15,7 @@
 //! - `verify`: a run computed again in an independent way.
 //! - `stems`: error of drawn positions against work for stems that bend; `surroundings`, `falls`, `gases`, `sheets`, `grounds`: exact cases and
 //!   speed of wind, stems, bodies that fall, gases, sheets and ground.
+//! - `coupling`: forces of the passive parts of a model on the active ones, and which coupling serves.
 //! - `case`, `hard`, `cases`: models with exact answers in their first lines.
 //!
 //! Runs are made one after another, never in parallel, because they are timed.
@@ -26,6 +27,7 @@ mod band;
 mod case;
 mod cases;
 mod compare;
+mod coupling;
 mod diagram;
 mod error;
 mod falls;
@@ -50,6 +52,10 @@ pub use band::band_svg;
 pub use case::{Case, Expectation, PlainModule, Within};
 pub use cases::CASES;
 pub use compare::{Agreement, Comparison, Difference, compare};
+pub use coupling::{
+    Active, Apart, Coupling, CouplingError, CouplingPlan, CouplingStudy, Decision, Feet, Question, Range,
+    Row, Thresholds, Trial, coupling_csv, coupling_json, coupling_study, coupling_text, has_feedback,
+};
 pub use error::Error;
 pub use falls::{Landings, exact_fall_table};
 pub use files::{csv, hard_csv, hard_json, json};
@@ -60,7 +66,9 @@ pub use order::{nominal_order, observed_order};
 pub use plot::svg;
 pub use record::{Accuracy, EarlyEnd, Record, Setup, Task, method_name};
 pub use reference::{Reference, References};
-pub use sheets::{Passes, exact_sheet_table, net_table, sheet_speed_table};
+pub use sheets::{
+    Passes, exact_sheet_table, hard_sheet_table, net_table, sheet_method_table, sheet_speed_table,
+};
 pub use spread::{QUANTILES, Spread, SpreadSeries, spread_csv, spread_table};
 pub use stems::{StemOutcome, StemPoint, StemStudy, stem_csv, stem_study, stem_table};
 pub use study::{Outcome, Plan, Point, Series, Study, Wall, default_times, study};

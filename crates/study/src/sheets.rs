@@ -1,11 +1,13 @@
-//! Exact cases, the ball in the net, random passes of solids, and speed of sheets, as tables.
+//! Exact cases, the ball in the net, methods side by side, hard cases, random passes of solids, and speed of sheets, as tables.
 
-use dlsys_sheet::study::{Coupling, RandomPass, catch, paces, random_pass, throw_steps};
-use dlsys_sheet::{self as sheet, Settings};
+use dlsys_sheet::study::{
+    Coupling, HardCase, METHOD_CASES, RandomPass, catch, methods, paces, random_pass, throw_steps,
+};
+use dlsys_sheet::{self as sheet, Method, Settings};
 use dlsys_sim::brief;
 use dlsys_wind::study::Convergence;
 
-use super::table::{Table, exact_table};
+use super::table::{Table, duration, exact_table};
 
 /// Radius in m of the open end of the net: half that of the ball.
 const END: f64 = 0.06;
@@ -48,6 +50,71 @@ pub fn net_table() -> Result<String, sheet::Error> {
     }
     table.write("  ", &mut out);
     Ok(out)
+}
+
+/// Error of places against work of the implicit methods, side by side.
+///
+/// # Errors
+/// An error of the solver, which is a defect.
+pub fn sheet_method_table() -> Result<String, sheet::Error> {
+    let mut out = "sheets: error of places against work, relative to the extent; sdirk2 is the method in use, euler for comparison\n".to_owned();
+    let mut table = Table::default();
+    table.push(["", "", "tolerance", "error", "steps", "rejected", "time", ""].map(str::to_owned));
+    for case in &METHOD_CASES {
+        let mut before = "";
+        for row in methods(case)? {
+            let name = if row.case == before { "" } else { row.case };
+            before = row.case;
+            let method = match row.method {
+                Method::Sdirk2 => "sdirk2",
+                Method::Euler => "euler",
+            };
+            let [steps, rejected] = row.steps.map(|count| count.to_string());
+            let (tolerance, error) = (format!("{:e}", row.tolerance), format!("{:.1e}", row.error));
+            let last = String::new();
+            table.push([
+                name.to_owned(),
+                method.to_owned(),
+                tolerance,
+                error,
+                steps,
+                rejected,
+                duration(row.seconds),
+                last,
+            ]);
+        }
+    }
+    table.write("  ", &mut out);
+    Ok(out)
+}
+
+/// Hard cases of sheets as a table.
+pub fn hard_sheet_table(cases: &[HardCase]) -> String {
+    let mut out = "sheets: a ball drives them too far or hits them too fast, at the default tolerance of 1e-3; depth in radii of the ball, ways in extents of the sheet, gain of energy in parts of that of the ball\n".to_owned();
+    let mut table = Table::default();
+    let heads = ["", "seconds", "steps", "rejected", "shortest", "depth", "moved", "at the end", "gain", ""];
+    table.push(heads.map(str::to_owned));
+    for case in cases {
+        let [steps, rejected] = case.steps.map(|count| count.to_string());
+        let [moved, last] = case.moved.map(|way| brief(way, 3));
+        table.push([
+            case.case.to_owned(),
+            brief(case.span, 3),
+            steps,
+            rejected,
+            format!("{:.1e} s", case.shortest),
+            brief(case.depth, 2),
+            moved,
+            last,
+            case.gain.map_or(String::new(), |gain| format!("{gain:.0e}")),
+            if case.failure.is_some() { "fails" } else { "" }.to_owned(),
+        ]);
+    }
+    table.write("  ", &mut out);
+    for (case, error) in cases.iter().filter_map(|case| Some((case.case, case.failure.as_ref()?))) {
+        out += &format!("  {case}: {error}\n");
+    }
+    out
 }
 
 /// Solids that move through sheets at random.

@@ -37,6 +37,17 @@ impl Knot {
     }
 }
 
+/// The foot of a stem that gives way, where it stands on what does not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Foot {
+    /// The kind of the module that draws the stem.
+    pub kind: dlsys_model::KindId,
+    /// The elastic moment in N m that the stem and all that it carries pass on beyond that at rest.
+    pub moment: f64,
+    /// The bending strain there, without unit.
+    pub strain: f64,
+}
+
 /// The motion of the stems from one tick to the next. Times are in s.
 #[derive(Clone, Debug)]
 pub(crate) struct Tick {
@@ -76,6 +87,22 @@ impl Tick {
             }));
         }
         points
+    }
+
+    /// The feet of stems at the tick.
+    pub(crate) fn feet(&self) -> Vec<Foot> {
+        let Body { skeleton, stems, .. } = &*self.body;
+        let strain = |stem: usize| self.knots.first().map_or(Vector::zeros(), |knot| knot.strain[stem]);
+        let roots = skeleton.segments().iter().enumerate().filter(|(_, segment)| segment.parent.is_none());
+        let foot = |(stem, segment): (usize, &sway::Segment)| {
+            let (origin, strain) = (stems[stem].origin, strain(stem));
+            Foot {
+                kind: origin.kind,
+                moment: segment.rigidity().component_mul(&strain).norm(),
+                strain: strain.y.hypot(strain.z) * segment.diameter / 2.0,
+            }
+        };
+        roots.map(foot).collect()
     }
 
     /// Number of strains that are kept.

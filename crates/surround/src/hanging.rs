@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use dlsys_geometry::scene::{Point, Scene, SheetKey, SheetPlace};
-use dlsys_geometry::turtle::{self, Origin};
+use dlsys_geometry::turtle;
 use dlsys_model::{Model, Tissue};
 use dlsys_sheet::{
     self as sheet, Counts, Mesh, Place as Stand, Settings, Shape, Sheet, Solid, Solver, State, Step, Vector,
@@ -28,6 +28,7 @@ use crate::leading::Leading;
 use crate::line::{Exerted, Line};
 use crate::paths::{INSTANTS, Path, Watch};
 use crate::place::Place;
+use crate::tracks::{Hung, Part, Passage, Tick, Track};
 use crate::weather::{Gusts, Sampler};
 use crate::{Error, MOST_SHEET_POINTS};
 
@@ -37,77 +38,6 @@ pub const TICK: f64 = 1.0 / 64.0;
 /// Largest speed along each axis, in m/s, with which points begin, at random: a sheet in an upright plane would not leave it otherwise, and a flag would
 /// stand out in still air for ever. Nobody sees it: it moves a point by some micrometres.
 const TREMBLE: f64 = 1e-4;
-
-/// A sheet that a module has placed.
-#[derive(Debug)]
-pub(crate) struct Hung {
-    pub(crate) key: SheetKey,
-    pub(crate) origin: Origin,
-    /// Its index among those that the model declares.
-    pub(crate) sheet: usize,
-    pub(crate) made: Arc<Sheet>,
-    /// When it begins, in s.
-    pub(crate) begin: f64,
-}
-
-/// A sheet through a tick or a part of it: its states at the ends of steps, and where it begins.
-#[derive(Clone, Debug)]
-pub(crate) struct Track {
-    pub(crate) hung: Arc<Hung>,
-    pub(crate) steps: Vec<(f64, State)>,
-    /// What it does to the solids that sheets push, by their modules.
-    pub(crate) forces: Vec<(u64, Line)>,
-}
-
-impl Track {
-    /// The state at a time in s; `None` before its birth.
-    pub(crate) fn at(&self, time: f64) -> Option<State> {
-        let first = self.steps.first().filter(|(begin, _)| *begin <= time)?;
-        let next = self.steps.partition_point(|(end, _)| *end < time);
-        let Some((to, after)) = self.steps.get(next) else {
-            return self.steps.last().map(|(_, last)| last.clone());
-        };
-        let (from, before) = if next == 0 { first } else { &self.steps[next - 1] };
-        Some(Step { from: *from, to: *to, before, after, pushes: &[], depths: &[] }.at(time))
-    }
-
-    fn points(&self) -> usize {
-        self.steps.len() * self.hung.made.len()
-    }
-}
-
-/// What happens to sheets from one tick to the next.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Tick {
-    pub(crate) number: u64,
-    /// One, or several where rules read forces.
-    pub(crate) parts: Vec<Part>,
-    /// Growth fails before the next tick; solids stand still until then.
-    pub(crate) failed: Option<Error>,
-}
-
-/// What happens to sheets from one time to another, both in s.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Part {
-    pub(crate) end: f64,
-    pub(crate) tracks: Vec<Track>,
-    pub(crate) descent: Descent,
-    /// What sheets do to solids whose rules read it, by the module at the beginning.
-    pub(crate) forces: BTreeMap<u64, Line>,
-}
-
-impl Tick {
-    /// The part within which a time in s lies.
-    pub(crate) fn part(&self, seconds: f64) -> Option<&Part> {
-        self.parts.iter().find(|part| part.end >= seconds).or(self.parts.last())
-    }
-
-    /// Number of points that are kept, and one for itself and for each part.
-    pub(crate) fn size(&self) -> usize {
-        let tracks = self.parts.iter().flat_map(|part| &part.tracks);
-        1 + self.parts.len() + tracks.map(Track::points).sum::<usize>()
-    }
-}
 
 /// A sheet where a part of a tick begins.
 #[derive(Clone)]
@@ -141,6 +71,8 @@ pub(crate) struct Hanging<'m> {
     pub(crate) hung: Vec<Hanger>,
     /// Where rules read the forces on solids.
     leading: Option<Leading>,
+    /// Parts have the ways of solids.
+    notes: bool,
     /// The kinds that place sheets.
     drapers: Arc<[bool]>,
     /// A drawing that places a sheet may do so at one time and not at another.
@@ -165,7 +97,31 @@ impl<'m> Hanging<'m> {
         let solver = Solver::new(Settings { tolerance, longest: TICK, ..Settings::default() });
         let (hung, scene) = (Vec::new(), turtle::blank(model));
         let leading = model.reads_force().then(Leading::default);
-        Hanging { model, place, growth, number: 0, hung, leading, drapers, chooses, wind, solver, scene }
+        let notes = false;
+        Hanging {
+            model,
+            place,
+            growth,
+            number: 0,
+            hung,
+            leading,
+            notes,
+            drapers,
+            chooses,
+            wind,
+            solver,
+            scene,
+        }
+    }
+
+    /// The same with solids on other ways: those of growth under no force, or, with this, under the forces of sheets. Parts have the ways of solids.
+    pub(crate) fn noted(self, leading: Option<Leading>) -> Hanging<'m> {
+        Hanging { leading, notes: true, ..self }
+    }
+
+    /// What solids are under the forces of sheets, if they are.
+    pub(crate) fn leading(&self) -> Option<&Leading> {
+        self.leading.as_ref()
     }
 
     /// Sets when the solver gives up.
@@ -388,16 +344,19 @@ impl<'m> Hanging<'m> {
     ) -> Result<Track, Error> {
         let from = hung.begin.max(span.start);
         let mut steps = vec![(from, state.clone())];
+        let mut impulses = vec![Vector::zeros(); solids.len()];
         if from < span.end {
             let wind = Gusts(&self.wind);
             let note = |step: &Step| {
                 steps.push((step.to, step.after.clone()));
+                impulses.iter_mut().zip(step.pushes).for_each(|(sum, push)| *sum += push.impulse);
                 observe(step);
             };
             let done = self.solver.advance(&hung.made, &mut state, from..span.end, solids, &wind, note);
             done.map_err(|error| self.failed(&hung, error))?;
         }
-        Ok(Track { hung, steps, forces: Vec::new() })
+        let pushes = impulses.into_iter().enumerate().filter(|(_, impulse)| *impulse != Vector::zeros());
+        Ok(Track { hung, steps, forces: Vec::new(), pushes: pushes.collect() })
     }
 
     /// A sheet that cannot be followed.
@@ -442,7 +401,13 @@ impl<'m> Hanging<'m> {
         }
         self.hung = hung;
         self.growth = growth;
-        let part = Part { end: begin + length, tracks, descent: view.descent, forces };
+        let ends = [begin, begin + length];
+        let passage = |path: &Path| {
+            let (origin, size) = (path.origin, 2.0 * path.shape.reach());
+            Passage { origin, size, ends: ends.map(|time| path.place(time)) }
+        };
+        let passages = if self.notes { view.paths.iter().map(passage).collect() } else { Vec::new() };
+        let part = Part { end: begin + length, tracks, descent: view.descent, forces, passages };
         (part, view.failed)
     }
 }

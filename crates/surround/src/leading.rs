@@ -15,17 +15,19 @@
 use std::collections::BTreeMap;
 
 use dlsys_geometry::turtle::Origin;
-use dlsys_model::Quantity;
+use dlsys_model::KindId;
 use dlsys_sheet::{Led, Matrix, Place as Stand, Shape, Solid, Step, Vector};
 use dlsys_sim::Simulation;
-use nalgebra::SymmetricEigen;
 
 use crate::Error;
+use crate::afloat::Afloat;
 use crate::descent::Descent;
 use crate::error::CouplingFault;
-use crate::hanging::{Hanger, Hanging, Part, TICK, Track, View};
+use crate::hanging::{Hanger, Hanging, TICK, View};
 use crate::line::{Exerted, Line};
+use crate::masses::Body;
 use crate::paths::{INSTANTS, Path};
+use crate::tracks::{Part, Track};
 
 /// Most halvings of a tick.
 const DEEPEST: u32 = 14;
@@ -38,32 +40,24 @@ const NEAR: f64 = 0.1;
 const SAME: f64 = 0.01;
 /// The next part is longer if the distance on the way is below this part of what is allowed.
 const ROOM: f64 = 0.15;
-/// The way of a solid by which its mass is measured, in parts of its size, and most tries to find the force for it.
-const PROBE: f64 = 1e-3;
-const TRIES: usize = 5;
-/// A mass makes a ninth of its way in the first third of a span. What makes all of it, but for this part, jumps with the force.
-const JUMP: f64 = 0.1;
-/// A part of an inverse mass that a mass does not have, relative to it, and still counts as an error of growth.
-const SKEW: f64 = 0.05;
-
 /// What goes on from part to part.
 #[derive(Clone, Default)]
 pub(crate) struct Leading {
     /// The inverse masses (1/kg) of solids that have been measured, by their modules.
-    masses: BTreeMap<u64, Matrix>,
+    pub(crate) masses: BTreeMap<u64, Matrix>,
     /// Productions of the part before.
-    descent: Descent,
+    pub(crate) descent: Descent,
     /// m of the length TICK/2^m.
     level: u32,
+    /// Solids whose equations read no force, and which sheets push all the same.
+    pub(crate) afloat: Afloat,
 }
 
-/// A solid whose rules read the force on it.
-struct Body {
-    /// Its number among the paths.
-    path: usize,
-    module: u64,
-    /// Its inverse mass in 1/kg.
-    light: Matrix,
+impl Leading {
+    /// With masses in kg of solids whose equations read no force, by their kinds.
+    pub(crate) fn with(masses: BTreeMap<KindId, f64>) -> Leading {
+        Leading { afloat: Afloat::new(masses), ..Leading::default() }
+    }
 }
 
 /// What one sheet does under forces of others: its track, its force on each body, and how that makes them deviate.
@@ -105,6 +99,7 @@ impl<'m> Hanging<'m> {
                     if leading.level > 0 && aligned && apart < ROOM {
                         leading.level -= 1;
                     }
+                    leading.afloat.go_on(&part.passages, (&part.forces, &leading.descent), part.end - begin);
                     leading.descent = part.descent.clone();
                     return Ok((part, failed));
                 }
@@ -122,9 +117,9 @@ impl<'m> Hanging<'m> {
             let sum = guess.entry(*module).or_default();
             *sum = sum.plus(line);
         }
-        let (mut growth, mut view) = self.led(span, (&guess, &leading.descent))?;
+        let (mut growth, mut view) = self.led(span, (&guess, &leading.descent), leading)?;
         let readers: Vec<(usize, u64)> = {
-            let all = view.paths.iter().enumerate().filter(|(_, path)| self.reads(path));
+            let all = view.paths.iter().enumerate().filter(|(_, path)| self.pushes(path, leading));
             all.map(|(i, path)| (i, path.origin.lineage.id)).collect()
         };
         let Some(&(first, _)) = readers.first() else {
@@ -147,7 +142,7 @@ impl<'m> Hanging<'m> {
                 let (part, failed) = self.end(span, (view, growth), solved.tracks, forces);
                 return Ok(Ok((part, failed, 0.0)));
             }
-            let (next_growth, next) = self.led(span, (&forces, &Descent::default()))?;
+            let (next_growth, next) = self.led(span, (&forces, &Descent::default()), leading)?;
             let allowed = self.allowed(&solved.tracks);
             let [at_end, between] = distances([&view, &next], &bodies, &solved.deviations, span);
             let agrees = view.births.len() == next.births.len() && at_end <= NEAR * allowed;
@@ -173,19 +168,23 @@ impl<'m> Hanging<'m> {
     }
 
     /// Growth through a span, under forces on modules before some productions.
-    fn led(
+    pub(crate) fn led(
         &mut self,
         span: (f64, f64),
         (forces, since): (&BTreeMap<u64, Line>, &Descent),
+        leading: &Leading,
     ) -> Result<(Simulation<'m>, View), Error> {
         let mut growth = self.growth.clone();
-        let view = self.look(&mut growth, span, Some(&Exerted { forces, since }))?;
+        let exerted = Exerted { forces, since };
+        let mut view = self.look(&mut growth, span, self.model.reads_force().then_some(&exerted))?;
+        leading.afloat.deviate(&mut view.paths, span.1, &exerted, &leading.descent);
         Ok((growth, view))
     }
 
-    /// Whether the rules of the module of a solid read the force on it.
-    fn reads(&self, path: &Path) -> bool {
-        self.model.kinds.get(path.origin.kind).reads_force()
+    /// Whether sheets push a solid: the rules of its module read the force on it, or its mass is given.
+    fn pushes(&self, path: &Path, leading: &Leading) -> bool {
+        let kind = path.origin.kind;
+        self.model.kinds.get(kind).reads_force() || leading.afloat.light(kind).is_some()
     }
 
     /// The first guess of the force of each sheet on each body.
@@ -336,101 +335,8 @@ impl<'m> Hanging<'m> {
         Ok(Pushed { track, forces, deviations })
     }
 
-    /// The bodies with their inverse masses, which are measured where they are not known or `again`.
-    fn weigh(
-        &mut self,
-        readers: &[(usize, u64)],
-        (view, span): (&View, (f64, f64)),
-        given: &BTreeMap<u64, Line>,
-        (leading, again): (&mut Leading, bool),
-    ) -> Result<Vec<Body>, Error> {
-        let known =
-            |module: u64| leading.descent.line(module).find_map(|id| leading.masses.get(&id)).copied();
-        let all: Option<Vec<Matrix>> = readers.iter().map(|(_, module)| known(*module)).collect();
-        let lights = match all.filter(|_| !again) {
-            Some(all) => all,
-            None => self.measure(readers, (view, span), given)?,
-        };
-        let bodies = readers.iter().zip(lights);
-        let bodies: Vec<Body> =
-            bodies.map(|((path, module), light)| Body { path: *path, module: *module, light }).collect();
-        leading.masses = bodies.iter().map(|body| (body.module, body.light)).collect();
-        Ok(bodies)
-    }
-
-    /// Measures inverse masses: ways that growth makes more under a force more. The axes of the model are those of the scene.
-    fn measure(
-        &mut self,
-        readers: &[(usize, u64)],
-        (view, span): (&View, (f64, f64)),
-        given: &BTreeMap<u64, Line>,
-    ) -> Result<Vec<Matrix>, Error> {
-        let end = span.0 + span.1;
-        let reads: Vec<[bool; 3]> = readers
-            .iter()
-            .map(|(path, _)| {
-                let kind = self.model.kinds.get(view.paths[*path].origin.kind);
-                [0, 1, 2].map(|axis| kind.input_parameter(Quantity::Force(axis)).is_some())
-            })
-            .collect();
-        let mut lights = vec![Matrix::zeros(); readers.len()];
-        let mut jumps = vec![false; readers.len()];
-        for axis in 0..3 {
-            let mut strengths: Vec<f64> =
-                reads.iter().map(|reads| f64::from(u8::from(reads[axis]))).collect();
-            // At first the mass is not known at all; a force that is near the right one is good enough.
-            for _ in 0..TRIES {
-                let mut forces = given.clone();
-                for ((_, module), strength) in readers.iter().zip(&strengths) {
-                    let force = forces.entry(*module).or_default();
-                    force.force[axis] += strength;
-                }
-                if strengths.iter().all(|strength| *strength == 0.0) {
-                    break;
-                }
-                let (_, probe) = self.led(span, (&forces, &Descent::default()))?;
-                let mut is_good = true;
-                for (b, (path, _)) in readers.iter().enumerate() {
-                    if strengths[b] == 0.0 {
-                        continue;
-                    }
-                    let ends = probe.paths.get(*path).filter(|_| probe.failed.is_none());
-                    let here = &view.paths[*path];
-                    let wanted = PROBE * here.shape.reach();
-                    let way = ends.map(|there| {
-                        let [third, whole] = [span.0 + span.1 / 3.0, end]
-                            .map(|time| there.place(time).position - here.place(time).position);
-                        let is_seen = whole.norm() > JUMP * wanted;
-                        jumps[b] |= is_seen && (third - whole).norm() < JUMP * whole.norm();
-                        whole
-                    });
-                    let factor = match way {
-                        None => 1e-3,
-                        Some(way) => {
-                            let column = way * (2.0 / (strengths[b] * span.1 * span.1));
-                            lights[b].set_column(axis, &column);
-                            if way == Vector::zeros() { 1.0 } else { wanted / way.norm() }
-                        }
-                    };
-                    is_good &= (0.1..=10.0).contains(&factor);
-                    strengths[b] *= factor.clamp(1e-9, 1e9);
-                }
-                if is_good {
-                    break;
-                }
-            }
-        }
-        let masses = readers.iter().zip(lights.iter().zip(&reads).zip(&jumps));
-        masses
-            .map(|((path, _), ((light, reads), jumps))| {
-                let fault = || self.fails(&view.paths[*path].origin, span.0, CouplingFault::NoMass);
-                as_of_a_mass(light, reads).filter(|_| !jumps).ok_or_else(fault)
-            })
-            .collect()
-    }
-
     /// A coupling that fails at a time in s.
-    fn fails(&self, origin: &Origin, begin: f64, fault: CouplingFault) -> Error {
+    pub(crate) fn fails(&self, origin: &Origin, begin: f64, fault: CouplingFault) -> Error {
         let time = self.place.time_at(begin);
         let kind = self.model.kinds.get(origin.kind).name.clone();
         let mut declared = self.model.scenery.solids.iter();
@@ -474,40 +380,4 @@ fn distances(
     }
     // A distance that is no number is none that is allowed.
     [at_end, between].map(|distance| if distance.is_nan() { f64::INFINITY } else { distance })
-}
-
-/// An inverse mass along the axes whose forces are read; `None` if no mass has it.
-fn as_of_a_mass(light: &Matrix, reads: &[bool; 3]) -> Option<Matrix> {
-    let read = Matrix::from_fn(|i, j| if reads[i] && reads[j] { light[(i, j)] } else { 0.0 });
-    let symmetric = (read + read.transpose()) / 2.0;
-    let found = SymmetricEigen::new(symmetric);
-    let (least, most) = (found.eigenvalues.min(), found.eigenvalues.max());
-    let skew = (read - symmetric).norm();
-    if !(least >= -SKEW * most && skew <= SKEW * most) {
-        return None;
-    }
-    let values = found.eigenvalues.map(|value| value.max(0.0));
-    let axes = found.eigenvectors;
-    Some(axes * Matrix::from_diagonal(&values) * axes.transpose())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_masses_are_masses() {
-        let with =
-            |rows: [[f64; 3]; 3], reads: [bool; 3]| as_of_a_mass(&Matrix::from_fn(|i, j| rows[i][j]), &reads);
-        let ball = [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 2.0]];
-        assert!(with(ball, [true; 3]).is_some_and(|light| (light - Matrix::identity() * 2.0).norm() < 1e-14));
-        let along_y = with(ball, [false, true, false]).expect("a mass");
-        assert!((along_y - Matrix::from_diagonal(&Vector::new(0.0, 2.0, 0.0))).norm() < 1e-14);
-        assert!(with([[0.0; 3]; 3], [true; 3]).is_some(), "what nothing moves");
-        assert!(with([[-1.0, 0.0, 0.0], [0.0; 3], [0.0; 3]], [true; 3]).is_none(), "against the force");
-        assert!(with([[1.0, 0.3, 0.0], [0.0, 1.0, 0.0], [0.0; 3]], [true; 3]).is_none());
-        // A pendulum that reads one force only, aslant.
-        let slope = [[0.5, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0; 3]];
-        assert!(with(slope, [true, false, false]).is_some_and(|light| (light[(0, 0)] - 0.5).abs() < 1e-15));
-    }
 }

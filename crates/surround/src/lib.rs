@@ -14,6 +14,7 @@
 //! - [`Classes`]: modes by which plants move that are small in the picture.
 //! - [`Gases`]: smoke, steam and pollen at any time.
 //! - [`Sheets`]: flexible surfaces and nets at any time.
+//! - [`Trial`]: solids among the sheets, on their own ways or pushed by them: motions, impulses, stretches.
 //! - [`Loose`]: what is let go, as a body.
 //! - [`Terrain`]: ground that gives way, at any time; [`Quilt`]: in pieces whose triangles stay the same.
 //! - [`Motion`]: the stems and the flights of a model at any time, as [`BentStems`] for [`draw_bent`](dlsys_geometry::turtle::draw_bent).
@@ -21,6 +22,7 @@
 #![warn(missing_docs)]
 
 mod advice;
+mod afloat;
 mod bending;
 mod body;
 mod classes;
@@ -36,6 +38,7 @@ mod leading;
 mod line;
 mod loose;
 mod marks;
+mod masses;
 mod motion;
 mod outlets;
 mod paths;
@@ -48,9 +51,11 @@ mod sheets;
 mod solids;
 mod survey;
 mod terrain;
+mod tracks;
+mod trial;
 mod weather;
 
-pub use bending::{BentStems, Effort};
+pub use bending::{BentStems, Effort, Foot};
 pub use classes::{ByModes, Classes};
 pub use coupled::start;
 pub use error::{CouplingFault, Error, FailedStem, FallingPart};
@@ -63,6 +68,7 @@ pub use quilt::Quilt;
 pub use sheets::Sheets;
 pub use survey::{Axis, Survey, Vibration, moves};
 pub use terrain::{TICKS as GROUND_TICKS, Terrain, TerrainReport};
+pub use trial::{SheetSeen, SolidSeen, Trial, TrialTick, Ways};
 pub use weather::{Sampler, Weather};
 
 /// Most points of all sheets of a scene.

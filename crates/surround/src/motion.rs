@@ -17,7 +17,7 @@ use dlsys_sim::{self as sim, Settings};
 use dlsys_sway as sway;
 use dlsys_tree::ModuleString;
 
-use crate::bending::{Bending, BentStems, Effort, bent};
+use crate::bending::{Bending, BentStems, Effort, Foot, bent};
 use crate::classes::ByModes;
 use crate::coupled;
 use crate::course::{Course, Past};
@@ -161,6 +161,11 @@ impl<'m> Motion<'m> {
     /// from the stem.
     pub fn points(&self) -> Vec<sway::Vector> {
         self.courses.lock().unwrap_or_else(PoisonError::into_inner).present.tick.points()
+    }
+
+    /// The feet of stems at the present tick: those that stand on what does not give way.
+    pub fn feet(&self) -> Vec<Foot> {
+        self.courses.lock().unwrap_or_else(PoisonError::into_inner).present.tick.feet()
     }
 
     /// The times, in units of the model, at which what it has let go was jolted by the ground, as far as it has been followed.

@@ -63,6 +63,12 @@ pub(crate) struct Path {
 }
 
 impl Path {
+    /// Adds ways at the instants, in m.
+    pub(crate) fn deviate(&mut self, ways: [Vector; 4]) {
+        let more = Cubic::through(ways);
+        self.centre.0.iter_mut().zip(more.0).for_each(|(here, more)| *here += more);
+    }
+
     /// Where it is at a time in s.
     pub(crate) fn place(&self, time: f64) -> Stand {
         let part = (time - self.begin) / self.length;

@@ -14,10 +14,11 @@ use dlsys_sim::{Settings, Simulation};
 
 use crate::Error;
 use crate::coupled;
-use crate::hanging::{Hanging, TICK, Tick, matched};
+use crate::hanging::{Hanging, TICK, matched};
 use crate::marks::{Marks, Recent};
 use crate::motion::MOST_TICKS;
 use crate::place::Place;
+use crate::tracks::Tick;
 use crate::weather::{Sampler, Weather};
 
 /// Most points of the ticks that are kept for times that come a little late, and of marks.
@@ -48,21 +49,12 @@ impl<'m> Sheets<'m> {
     /// # Errors
     /// A wind without meaning, or the first instant fails.
     pub fn new(model: &'m Model, settings: Settings) -> Result<Option<Sheets<'m>>, Error> {
-        if !turtle::drapes(model) {
-            return Ok(None);
-        }
         let place = Place::of_scene(&model.scenery);
-        let settings = Settings { log: true, transitions: false, ..settings };
-        // Forces of sheets on solids are computed here.
-        let growth = match model.reads_force() {
-            true => Simulation::new(model, settings)?,
-            false => coupled::start(model, settings, place)?,
-        };
-        let wind = Arc::new(Sampler::new(Weather::around_bodies(&model.scenery)?, place));
-        let start = Hanging::new(model, (growth, place), wind, settings.bending.tolerance);
+        let Some(start) = first(model, settings, place)? else { return Ok(None) };
         let (past, marks) = (Recent::new(MOST_KEPT), Marks::new(MOST_MARKED));
         let runs = Runs { start, present: None, past, marks, spent: Duration::ZERO };
         let rests = model.scenery.sheets.iter().map(|sheet| at_rest(sheet)).collect();
+        let settings = logged(settings);
         Ok(Some(Sheets { model, settings, place, rests, runs: Mutex::new(runs) }))
     }
 
@@ -201,6 +193,30 @@ impl<'m> Sheets<'m> {
             });
         }
     }
+}
+
+/// Settings of a growth whose productions are known.
+fn logged(settings: Settings) -> Settings {
+    Settings { log: true, transitions: false, ..settings }
+}
+
+/// The sheets of a model at the first tick; `None` if nothing places one.
+pub(crate) fn first<'m>(
+    model: &'m Model,
+    settings: Settings,
+    place: Place,
+) -> Result<Option<Hanging<'m>>, Error> {
+    if !turtle::drapes(model) {
+        return Ok(None);
+    }
+    let settings = logged(settings);
+    // Forces of sheets on solids are computed here.
+    let growth = match model.reads_force() {
+        true => Simulation::new(model, settings)?,
+        false => coupled::start(model, settings, place)?,
+    };
+    let wind = Arc::new(Sampler::new(Weather::around_bodies(&model.scenery)?, place));
+    Ok(Some(Hanging::new(model, (growth, place), wind, settings.bending.tolerance)))
 }
 
 /// The faces of a sheet as triangles.

@@ -56,7 +56,17 @@ fn ways(model: &Model) -> String {
         forces.extend(kind.read_inputs().map(|(quantity, _)| quantity));
     }
     if names.is_empty() {
-        return "one way: no rule reads what it does".to_owned();
+        let solids = model.scenery.solids.iter().map(|(kind, _)| &*model.kinds.get(*kind).name);
+        let mut may: Vec<&str> = solids.filter(|name| crate::study::has_feedback(model, name)).collect();
+        may.dedup();
+        let one_way = "one way: no rule reads what it does";
+        return match &may[..] {
+            [] => one_way.to_owned(),
+            names => format!(
+                "{one_way}; hybrid, if what the equations of {} do with places or velocities stands in for it (`dlsys report --coupling`)",
+                names.join(", ")
+            ),
+        };
     }
     forces.sort();
     forces.dedup();

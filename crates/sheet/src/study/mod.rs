@@ -5,6 +5,8 @@ use dlsys_wind::study::Convergence;
 use crate::{Error, Settings};
 
 mod collision;
+mod hard;
+mod methods;
 mod motion;
 mod net;
 mod random;
@@ -12,6 +14,8 @@ mod speed;
 mod statics;
 
 pub use collision::{collision, floor, trampoline};
+pub use hard::{HardCase, hard_cases};
+pub use methods::{METHOD_CASES, MethodCase, Work, methods};
 pub use motion::{fall, pendulum, vibration};
 pub use net::{Catch, Coupling, catch, hoop_net, throw_steps};
 pub use random::{RandomPass, random_pass};

@@ -1,4 +1,6 @@
-//! `dlsys report`: work-precision studies of models, and the hard cases.
+//! `dlsys report`: work-precision studies of models, the hard cases, and how the parts of a scene are coupled.
+
+mod coupling;
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -35,10 +37,7 @@ pub fn report(args: &ReportArgs) -> Result<(), Failure> {
         let count = names.entry(stem.clone()).or_insert(0);
         *count += 1;
         let name = if *count == 1 { stem } else { format!("{stem}-{count}") };
-        match args.verify {
-            true => failed += usize::from(!verify(args, &session)?),
-            false => study(args, &session, &name)?,
-        }
+        failed += usize::from(!of(args, (Some(model), &session), &name)?);
     }
     match failed {
         0 => Ok(()),
@@ -49,14 +48,29 @@ pub fn report(args: &ReportArgs) -> Result<(), Failure> {
     }
 }
 
+/// The report of a model that has been read, from a file if it has a path; `name` is the stem of the files. False if it is not verified, where that is asked for; the reason
+/// has been printed.
+pub fn of(
+    args: &ReportArgs,
+    (path, session): (Option<&Path>, &Session),
+    name: &str,
+) -> Result<bool, Failure> {
+    match (args.verify, args.coupling) {
+        (true, _) => return verify(args, session),
+        (_, true) => coupling::coupling(args, (path, session), name)?,
+        (false, false) => study(args, session, name)?,
+    }
+    Ok(true)
+}
+
 /// Verifies a model at each tolerance. False if that fails; the reason has been printed.
 fn verify(args: &ReportArgs, session: &Session) -> Result<bool, Failure> {
     let tolerances = args.tolerances.clone().unwrap_or_else(Plan::default_tolerances);
-    super::verify::verify_all(args, session, &tolerances, &times(args, session)?, &print)
+    crate::cli::verify::verify_all(args, session, &tolerances, &times(args, session)?, &print)
 }
 
 /// Studies a model that has been read; `name` is the stem of the files.
-pub fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure> {
+fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure> {
     let plan = Plan {
         methods: args.methods.clone().unwrap_or_else(|| Method::NAMED.iter().map(|(_, m)| *m).collect()),
         tolerances: args.tolerances.clone().unwrap_or_else(Plan::default_tolerances),
@@ -136,7 +150,7 @@ const PASSES: u64 = 100;
 /// Exact cases, hard cases and speed of wind, stems, bodies that fall, gases, sheets and ground. Each table is printed when it is complete.
 fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     let defect = |error: String| Failure::Model(format!("error: {error}\n"));
-    let mut progress = Progress::of_printed("surroundings", 16);
+    let mut progress = Progress::of_printed("surroundings", 18);
     let mut show = |table: String| {
         progress.inc();
         progress.suspend(|| print(&format!("{table}\n")))
@@ -171,6 +185,9 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     }
     show(study::exact_sheet_table(&sheets))?;
     show(study::net_table().map_err(|error| defect(error.to_string()))?)?;
+    show(study::sheet_method_table().map_err(|error| defect(error.to_string()))?)?;
+    let driven = crate::sheet::study::hard_cases().map_err(|error| defect(error.to_string()))?;
+    show(study::hard_sheet_table(&driven))?;
     let passes = study::Passes::new(PASSES);
     show(passes.table())?;
     let mut grounds = Vec::new();
@@ -204,6 +221,7 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     let bad = wind.iter().filter(|row| !row.holds()).count();
     let failed = hard.iter().filter(|case| case.failure.is_some()).count()
         + random.iter().filter(|case| case.failure.is_some()).count()
+        + driven.iter().filter(|case| case.failure.is_some()).count()
         + landings.failed()
         + passes.failed();
     match bad + failed {
