@@ -4,6 +4,7 @@
 //! Tests that take long, or that need a program that not every machine has, are ignored by `cargo test`; `.ci/run` runs
 //! them too (`cargo test -- --include-ignored`).
 
+mod air;
 mod algebraic;
 mod blocks;
 mod book;
@@ -27,6 +28,7 @@ mod glb;
 mod glb_reader;
 mod groups;
 mod inspect;
+mod land;
 mod language;
 mod layout;
 mod light;

@@ -68,7 +68,12 @@ pub fn build(
         return None;
     }
     let places = Places { occurs, drawn, materials };
-    let looks = Looks { parameters, appearance, scenery };
+    let mut looks = Looks { parameters, appearance, scenery };
+    if let Some(air) = &scope.air {
+        looks.scenery.flow_reader = air.read;
+        looks.scenery.eddies = air.slot();
+    }
+    looks.scenery.heights = scope.land.slot();
     Some(parts.model(document, kinds, (&clocks, &inputs), &places, looks, scope))
 }
 

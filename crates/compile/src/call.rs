@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use crate::advice;
+use crate::air;
 use crate::chance::DRAW;
+use crate::land;
 use crate::scope::{FORMAL, Function, Lowered, Scope, Variables, plural};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{Binary, Integral, Node, NodeId, Part, Unary};
@@ -86,6 +88,16 @@ impl Scope {
             count(self, 2)?;
             return number(self.graph.binary(*op, nodes[0], nodes[1]));
         }
+        if let Some(component) = air::FUNCTIONS.iter().position(|known| *known == &**name)
+            && !self.constants.contains_key(name)
+        {
+            count(self, 3)?;
+            return number(self.flow(component, span, [nodes[0], nodes[1], nodes[2]], variables)?);
+        }
+        if &**name == land::FUNCTION && !self.constants.contains_key(name) {
+            count(self, 2)?;
+            return number(self.ground(span, [nodes[0], nodes[1]], variables)?);
+        }
         if let Some(distribution) = Distribution::named(name) {
             return self.draw(distribution, span, nodes);
         }
@@ -102,6 +114,7 @@ impl Scope {
         let built_in = Unary::NAMED.iter().map(|(n, _)| *n).chain(Binary::NAMED.iter().map(|(n, _)| *n));
         let own = self.functions.keys().chain(self.curves.keys()).filter(|_| self.suggests());
         let built_in = built_in.chain(Distribution::NAMED.iter().map(|(n, ..)| *n));
+        let built_in = built_in.chain(air::FUNCTIONS).chain([land::FUNCTION]);
         let known = own.map(|n| &**n).chain(built_in).chain(dlsys_syntax::library_names());
         let mut error =
             Diagnostic::error(format!("unknown function `{name}`")).at(span, "no function has this name");
@@ -131,6 +144,8 @@ impl Scope {
         match self.functions.get(name) {
             Some(function) => format!("{name}({})", function.parameters.join(", ")),
             None if Binary::NAMED.iter().any(|(n, _)| *n == name) => format!("{name}(x, y)"),
+            None if air::FUNCTIONS.contains(&name) => format!("{name}(x, y, z)"),
+            None if name == land::FUNCTION => format!("{name}(x, z)"),
             None => format!("{name}(x)"),
         }
     }

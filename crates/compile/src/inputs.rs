@@ -15,9 +15,12 @@ use dlsys_expr::NodeId;
 use dlsys_model::{Input, Kinds, Model, Quantity};
 use dlsys_syntax::ast::{self, Action, Document, Expr, ExprId, Expression, Expressions, HeadModule, Item};
 
+/// The name of the state of the ground among the variables of a rule, which nobody can write.
+pub(super) const LAYER: &str = "ground ";
+
 /// The quantity of a name in expressions.
 pub(super) fn named(name: &str) -> Option<Quantity> {
-    Quantity::ALL.into_iter().find(|quantity| quantity.name() == name)
+    Quantity::NAMED.into_iter().find(|quantity| quantity.name() == name)
 }
 
 /// A range of nodes of expressions, the last included.
@@ -44,13 +47,20 @@ impl Inputs {
     /// Finds the rules that read them, unless the model declares a name of its own.
     pub fn new(document: &Document, scope: &Scope) -> Inputs {
         let mut inputs = Inputs::default();
-        let built_in = Quantity::ALL.into_iter().filter(|quantity| !is_declared(scope, quantity.name()));
-        let built_in: Vec<Quantity> = built_in.collect();
+        let built_in = Quantity::NAMED.into_iter().filter(|quantity| !is_declared(scope, quantity.name()));
+        let mut built_in: Vec<Quantity> = built_in.collect();
+        if scope.land.moves() && !is_declared(scope, Quantity::Ground.name()) {
+            built_in.push(Quantity::Ground);
+        }
         for (item, _) in &document.items {
             inputs.has_sheet |= matches!(item, Item::Sheet { .. });
             let Item::Rule(rule) = item else { continue };
             for &quantity in &built_in {
-                let Some(place) = first_read(&document.expressions, rule, quantity.name()) else { continue };
+                let place = match quantity {
+                    Quantity::Ground => first_call(&document.expressions, rule, quantity.name()),
+                    _ => first_read(&document.expressions, rule, quantity.name()),
+                };
+                let Some(place) = place else { continue };
                 let (name, arity) = (&rule.predecessor.name.text, rule.predecessor.parameters.len());
                 let head = (sort(name).into_owned(), arity);
                 inputs.readers.entry(head.clone()).or_default().insert(quantity);
@@ -126,18 +136,20 @@ impl RuleBuilder<'_> {
         for (quantity, parameter) in self.read_inputs(&rule.predecessor) {
             if self.inputs.rules.contains(&(rule.nodes.0, quantity)) {
                 let node = self.scope.graph.var(parameter as u32);
-                variables.names.insert(quantity.name().into(), node);
+                let name = if quantity == Quantity::Ground { LAYER } else { quantity.name() };
+                variables.names.insert(name.into(), node);
             }
         }
     }
 
-    /// The equations: the rate of a value is its slope, which is constant. Discrete rules have no equations.
+    /// The equations: the rate of a value is its slope, which is constant. Discrete rules have no equations, and the number of a ground does not move.
     pub(super) fn input_rates(&mut self, rule: &ast::Rule) -> Vec<(usize, NodeId)> {
         if rule.discrete {
             return Vec::new();
         }
-        let parameters = self.read_inputs(&rule.predecessor).into_values();
-        parameters.map(|parameter| (parameter, self.scope.graph.var(parameter as u32 + 1))).collect()
+        let read = self.read_inputs(&rule.predecessor).into_iter();
+        let moving = read.filter(|(quantity, _)| *quantity != Quantity::Ground);
+        moving.map(|(_, parameter)| (parameter, self.scope.graph.var(parameter as u32 + 1))).collect()
     }
 
     /// Before the productions of a rule are lowered.
@@ -153,7 +165,12 @@ impl RuleBuilder<'_> {
         let (mut takes_force, taken) = (false, self.handing.forces_are_taken);
         for input in inputs {
             let is_force = input.quantity.is_force();
-            let is_barred = if is_force { taken } else { in_branch };
+            let is_barred = match input.quantity {
+                Quantity::Strain => in_branch,
+                Quantity::Force(_) => taken,
+                // Simulations give each new module the present one.
+                Quantity::Ground => true,
+            };
             takes_force |= is_force && input.is_read;
             let from = self.handing.parent.get(&input.quantity).filter(|_| input.is_read && !is_barred);
             let graph = &mut self.scope.graph;
@@ -170,9 +187,10 @@ impl RuleBuilder<'_> {
 /// The error of a quantity outside rules.
 pub(super) fn misplaced(quantity: Quantity, span: Span) -> Diagnostic {
     let name = quantity.name();
-    let what = match quantity.is_force() {
-        true => "the force on a solid is known in the rules of its module only",
-        false => "the bending strain of a module is known in its own rules only",
+    let what = match quantity {
+        Quantity::Force(_) => "the force on a solid is known in the rules of its module only",
+        Quantity::Strain => "the bending strain of a module is known in its own rules only",
+        Quantity::Ground => "the height of soil, which may move, is known in rules only",
     };
     let short = &name[..1];
     Diagnostic::error(format!("`{name}` has no meaning here")).at(span, what).help(format!("read it in a condition, an equation or a successor of the module's rule, and pass its value on: to a function as an argument, to a drawing or a neighbour as a parameter (`solve {short} = {name}`)"))
@@ -180,8 +198,20 @@ pub(super) fn misplaced(quantity: Quantity, span: Span) -> Diagnostic {
 
 /// Reports rules that read what nothing gives.
 pub(super) fn check(model: &Model, inputs: &Inputs, diagnostics: &mut Vec<Diagnostic>) {
-    let strain = inputs.first(|quantity| !quantity.is_force());
+    let strain = inputs.first(|quantity| quantity == Quantity::Strain);
     let force = inputs.first(Quantity::is_force);
+    if let (Some((_, ground)), Some((quantity, other))) =
+        (inputs.first(|quantity| quantity == Quantity::Ground), strain.or(force))
+    {
+        let (name, what) = (quantity.name(), if quantity.is_force() { "sheets" } else { "stems" });
+        diagnostics.push(
+            Diagnostic::error(format!("rules read both `ground` and `{name}`"))
+                .at(ground, "the height of soil that may move")
+                .at(other, format!("what {what} do"))
+                .help(format!("growth goes on in turn with its ground or with its {what}: let the rules do without one of them, make two models, or declare a rigid ground, as in `ground 0`")),
+        );
+        return;
+    }
     if let Some((_, span)) = strain.filter(|_| model.scenery.tissues.is_empty()) {
         diagnostics.push(
             Diagnostic::error("`strain` reads the bending of stems, and nothing bends here")
@@ -231,6 +261,12 @@ fn is_declared(scope: &Scope, name: &str) -> bool {
         || scope.curves.contains_key(name)
         || scope.arrays.contains_key(name)
         || scope.poisoned.contains(name)
+}
+
+/// The first place of a rule that calls a function.
+fn first_call(all: &Expressions, rule: &ast::Rule, wanted: &str) -> Option<Span> {
+    let calls = |id: &u32| matches!(all.get(ExprId(*id)), Expr::Call(name, _) if &**name == wanted);
+    (rule.nodes.0.0..rule.nodes.1.0).find(calls).map(|id| all.span(ExprId(id)))
 }
 
 /// The first place of a rule that reads a name and means the built-in one.

@@ -10,6 +10,7 @@
 #![warn(missing_docs)]
 
 mod advice;
+mod air;
 mod analysis;
 mod appearance;
 mod build;
@@ -29,6 +30,7 @@ mod gases;
 mod gather;
 mod globals;
 mod inputs;
+mod land;
 mod locals;
 mod measure;
 mod physics;
@@ -104,20 +106,22 @@ fn load_nested(
 }
 
 /// The functions that an expression can call without declaring them: those of numbers, distributions, aggregates, of
-/// curves, and of the library.
+/// curves, of the wind and the ground, and of the library.
 pub fn functions() -> impl Iterator<Item = &'static str> {
     let numbers =
         Unary::NAMED.iter().map(|(name, _)| *name).chain(Binary::NAMED.iter().map(|(name, _)| *name));
     let draws = Distribution::NAMED.iter().map(|(name, ..)| *name);
     let curves = curves::FUNCTIONALS.iter().map(|(name, _)| *name);
-    numbers.chain(draws).chain(dlsys_syntax::words::FOLDS).chain(curves).chain(dlsys_syntax::library_names())
+    let known = numbers.chain(draws).chain(dlsys_syntax::words::FOLDS).chain(curves).chain(air::FUNCTIONS);
+    let known = known.chain([land::FUNCTION]);
+    known.chain(dlsys_syntax::library_names())
 }
 
 #[cfg(test)]
 mod tests {
     #[test]
     fn functions_of_every_origin_are_listed() {
-        for name in ["integral", "gompertz", "sin", "max", "sum", "normal"] {
+        for name in ["integral", "gompertz", "sin", "max", "sum", "normal", "flow_y", "ground"] {
             assert!(super::functions().any(|known| known == name), "{name}");
         }
     }

@@ -197,6 +197,9 @@ impl Builder<'_> {
         let [speed, turbulence, scale, roughness, period, seed, spectrum] = self.sorted(attributes, WORDS);
         let direction = self.direction(direction, "a wind towards positive x is `wind 1, 0, 0 speed 3`");
         let program = self.speed(speed, span);
+        if let (Some(speed), true) = (speed, program.is_some()) {
+            self.speed = self.nodes_of_time(&speed.values).and_then(|nodes| nodes.first().copied());
+        }
         let intensity = self.attribute(turbulence, &TURBULENCE);
         let size = self.attribute(scale, &SCALE);
         let z0 = self.attribute(roughness, &ROUGHNESS);
@@ -230,7 +233,8 @@ impl Builder<'_> {
         self.scenery.wind = Some(Wind {
             direction,
             speed: program,
-            turbulence: intensity.unwrap_or(0.0),
+            // Kolmogorov's spectrum has an amplitude of its own.
+            turbulence: intensity.unwrap_or(if spectrum.is_some() { 1.0 } else { 0.0 }),
             // Without turbulence the scale has no effect.
             scale: size.unwrap_or(1.0),
             roughness: z0,
@@ -333,7 +337,8 @@ impl Builder<'_> {
         let distance = self.attribute(decay, &DECAY);
         let mut written = kind.values.clone();
         written.extend(place.iter().chain(&axis).flat_map(|attribute| &attribute.values));
-        let Some(program) = self.of_time(&written) else { return };
+        let Some(nodes) = self.nodes_of_time(&written) else { return };
+        let program = Program::compile(&self.scope.graph, &nodes, 1);
         if let (Some(axis), Some([_, _, _, _, turns @ ..])) = (axis, program.constants()) {
             self.is_direction(turns, &axis.values, "a vortex around the vertical has `axis 0, 1, 0`");
         }
@@ -345,6 +350,7 @@ impl Builder<'_> {
                 "turbulence is a part of `wind`: `wind 1, 0, 0 speed 3 turbulence 0.2 scale 5`",
             ));
         }
+        self.flows.push(nodes);
         self.scenery.flows.push(Flow { primitive, program, decay: distance, span });
     }
 

@@ -5,11 +5,13 @@ use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::air::Air;
 use crate::appearance::color;
+use crate::land::Land;
 use crate::scope::{Scope, Variables};
 use crate::{Setting, advice, load_nested};
 use dlsys_diagnostic::{Diagnostic, Severity, Source, Span};
-use dlsys_expr::Program;
+use dlsys_expr::{NodeId, Program};
 use dlsys_model::{Appearance, COMMAND_SURFACES, Camera, Plant, Scenery};
 use dlsys_syntax::Files;
 use dlsys_syntax::ast::{Document, Expression, Item, Name, Text};
@@ -50,7 +52,8 @@ pub(crate) fn build(
     files: &dyn Files,
     nesting: &Nesting,
 ) -> Scenery {
-    let mut builder = Builder { document, scope, files, scenery: Scenery::default(), seen: Vec::new() };
+    let (scenery, seen) = (Scenery::default(), Vec::new());
+    let mut builder = Builder { document, scope, files, scenery, seen, speed: None, flows: Vec::new() };
     // Ground and what is poured name soils that may be declared behind them.
     for (item, span) in &document.items {
         if let Item::Soil { name, attributes, colors } = item {
@@ -106,7 +109,10 @@ pub(crate) fn build(
             builder.sheet((name, file, tissue, *pinned), *span, appearance);
         }
     }
-    builder.scenery
+    let Builder { scenery, speed, flows, scope, .. } = builder;
+    scope.air = Air::new(&scenery, speed, flows, &mut scope.graph);
+    scope.land = Land::new(&scenery);
+    scenery
 }
 
 /// The scenery so far, and what its declarations are compiled with.
@@ -117,6 +123,9 @@ pub(crate) struct Builder<'b> {
     pub(crate) scenery: Scenery,
     /// Declarations that may stand once, with their places.
     seen: Vec<(&'static str, Span)>,
+    /// The speed of the wind, and the values of its flows, as expressions of `t`.
+    pub(crate) speed: Option<NodeId>,
+    pub(crate) flows: Vec<Vec<NodeId>>,
 }
 
 impl Builder<'_> {
@@ -130,6 +139,12 @@ impl Builder<'_> {
 
     /// A program over `t`.
     pub(crate) fn of_time(&mut self, expressions: &[Expression]) -> Option<Program> {
+        let roots = self.nodes_of_time(expressions)?;
+        Some(Program::compile(&self.scope.graph, &roots, 1))
+    }
+
+    /// Expressions of `t`.
+    pub(crate) fn nodes_of_time(&mut self, expressions: &[Expression]) -> Option<Vec<NodeId>> {
         let no_age = "a scene has no age; `t` is the time";
         let mut variables = Variables { no_time: Some(no_age), ..Variables::default() };
         variables.names.insert("t".into(), self.scope.graph.var(0));
@@ -147,7 +162,7 @@ impl Builder<'_> {
             }
             roots.push(root);
         }
-        Some(Program::compile(&self.scope.graph, &roots, 1))
+        Some(roots)
     }
 
     fn camera(

@@ -5,9 +5,11 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::advice;
+use crate::air::{self, Air};
 use crate::call::Call;
 use crate::chance::Draws;
 use crate::inputs;
+use crate::land::{self, Land};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{Binary, Graph, Integral, Lookup, NodeId, Unary};
 use dlsys_model::{Comparison, Fold, Quantity};
@@ -89,6 +91,10 @@ pub struct Scope {
     /// Names that only comments define, with their values.
     pub(super) commented: HashMap<Arc<str>, String>,
     pub draws: Draws,
+    /// The wind, if the model declares one.
+    pub air: Option<Air>,
+    /// The ground.
+    pub land: Land,
     /// Errors in the settings, as opposed to the text.
     pub refused_settings: Vec<Diagnostic>,
     pub(super) work: usize,
@@ -452,7 +458,7 @@ impl Scope {
                 .map(|n| &**n)
                 .chain(RESERVED.into_iter().filter(|_| variables.no_time.is_none()))
                 .chain(std::iter::once("pi"))
-                .chain(Quantity::ALL.map(Quantity::name));
+                .chain(Quantity::NAMED.map(Quantity::name));
             let what = match variables.no_time {
                 None => "this is no parameter of the rule and no constant",
                 Some(_) => "this is no constant",
@@ -489,7 +495,10 @@ fn terms(all: &Expressions, first: u32, last: u32) -> Vec<bool> {
 }
 
 fn is_function(name: &str) -> bool {
-    Unary::NAMED.iter().any(|(n, _)| *n == name) || Binary::NAMED.iter().any(|(n, _)| *n == name)
+    Unary::NAMED.iter().any(|(n, _)| *n == name)
+        || Binary::NAMED.iter().any(|(n, _)| *n == name)
+        || air::FUNCTIONS.contains(&name)
+        || name == land::FUNCTION
 }
 
 /// "no parameters", "1 parameter", "2 parameters"

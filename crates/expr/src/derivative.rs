@@ -6,7 +6,7 @@ use super::{Binary, Graph, Node, NodeId, Part, Unary};
 
 impl Graph {
     /// The partial derivative of an expression by a variable. Functions that jump (`floor`, `sign`, comparisons)
-    /// have the derivative 0, which is what holds between the jumps.
+    /// have the derivative 0, which is what holds between the jumps; so have derivatives of fields, of which no second ones are known.
     pub fn derivative(&mut self, root: NodeId, variable: u32) -> NodeId {
         let zero = self.constant(0.0);
         let mut known: HashMap<NodeId, NodeId> = HashMap::new();
@@ -52,6 +52,18 @@ impl Graph {
                     self.times(slope, dx)
                 }
                 Node::Element(..) => zero,
+                Node::Field(field, part, at) => {
+                    let mut sum = zero;
+                    for (i, of) in at.into_iter().enumerate() {
+                        let rate = known[&of];
+                        if let Some(slope) = part.derivative(i).filter(|_| rate != zero) {
+                            let slope = self.field(field, slope, at);
+                            let share = self.times(slope, rate);
+                            sum = self.plus(sum, share);
+                        }
+                    }
+                    sum
+                }
             };
             known.insert(id, rate);
         }

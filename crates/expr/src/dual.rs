@@ -1,6 +1,6 @@
 //! Values with their derivative along a trajectory (forward differentiation).
 
-use super::{Array, Binary, Curve, Interval, Part, Unary, Value};
+use super::{Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Interval, Part, Unary, Value};
 
 /// A value and its rate of change.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +20,8 @@ pub trait Differentiable: Value {
     fn rate_of_steps(image: Self) -> Self;
     /// Rate of a choice between two branches.
     fn select_rate(condition: Self, a: Self, b: Self) -> Self;
+    /// A rate of which nothing is known.
+    fn unknown_rate() -> Self;
 }
 
 impl Differentiable for f64 {
@@ -32,6 +34,9 @@ impl Differentiable for f64 {
     fn select_rate(condition: f64, a: f64, b: f64) -> f64 {
         f64::select(condition, a, b)
     }
+    fn unknown_rate() -> f64 {
+        f64::NAN
+    }
 }
 
 impl Differentiable for Interval {
@@ -43,6 +48,9 @@ impl Differentiable for Interval {
     }
     fn select_rate(condition: Interval, a: Interval, b: Interval) -> Interval {
         if condition.lo == condition.hi { Interval::select(condition, a, b) } else { Interval::ENTIRE }
+    }
+    fn unknown_rate() -> Interval {
+        Interval::ENTIRE
     }
 }
 
@@ -165,5 +173,18 @@ impl<T: Differentiable> Value for Dual<T> {
         let value = T::element(array, index.value);
         let still = index.rate.is_zero();
         Dual { value, rate: if still { T::constant(0.0) } else { T::rate_of_steps(value) } }
+    }
+
+    fn field(field: &FieldSlot, part: FieldPart, at: [Dual<T>; FIELD_ARGUMENTS]) -> Dual<T> {
+        let places = at.map(|of| of.value);
+        let value = T::field(field, part, places);
+        let mut rate = T::constant(0.0);
+        for (i, of) in at.iter().enumerate().filter(|(_, of)| !of.rate.is_zero()) {
+            let slope =
+                part.derivative(i).map_or_else(T::unknown_rate, |slope| T::field(field, slope, places));
+            let share = T::binary(Binary::Mul, slope, of.rate);
+            rate = if rate.is_zero() { share } else { T::binary(Binary::Add, rate, share) };
+        }
+        Dual { value, rate }
     }
 }

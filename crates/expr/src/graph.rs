@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::{Array, Binary, Curve, Part, Unary, Value};
+use super::{Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Part, Unary, Value};
 
 /// An expression in a [`Graph`]. Two expressions of the same graph that are built alike are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -35,9 +35,11 @@ pub enum Node {
     Piece(Lookup, Part, NodeId, NodeId),
     /// An element of an array, by number.
     Element(Lookup, NodeId),
+    /// A part of a field at a time and a place.
+    Field(Lookup, FieldPart, [NodeId; FIELD_ARGUMENTS]),
 }
 
-/// A curve or an array of a [`Graph`].
+/// A curve, an array or a field of a [`Graph`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Lookup(u32);
 
@@ -48,6 +50,7 @@ pub struct Graph {
     ids: HashMap<Node, NodeId>,
     curves: Vec<Arc<Curve>>,
     arrays: Vec<Arc<Array>>,
+    fields: Vec<FieldSlot>,
     /// Expressions whose antiderivative by another one is known.
     integrals: HashMap<NodeId, Integral>,
 }
@@ -92,6 +95,23 @@ impl Graph {
     pub fn add_array(&mut self, array: Arc<Array>) -> Lookup {
         self.arrays.push(array);
         Lookup(self.arrays.len() as u32 - 1)
+    }
+
+    /// Adds a place for a field.
+    pub fn add_field(&mut self, slot: FieldSlot) -> Lookup {
+        self.fields.push(slot);
+        Lookup(self.fields.len() as u32 - 1)
+    }
+
+    /// The field of a lookup.
+    pub fn field_of(&self, lookup: Lookup) -> &FieldSlot {
+        &self.fields[lookup.0 as usize]
+    }
+
+    /// True if `roots` read a field.
+    pub fn reads_field(&self, roots: &[NodeId]) -> bool {
+        let is_field = |id: NodeId| matches!(self.node(id), Node::Field(..));
+        !self.fields.is_empty() && self.reachable(roots).into_iter().any(is_field)
     }
 
     /// The curve of a lookup.
@@ -175,6 +195,11 @@ impl Graph {
         }
     }
 
+    /// A part of a field at a time and a place. It is never folded: the field may come later.
+    pub fn field(&mut self, field: Lookup, part: FieldPart, at: [NodeId; FIELD_ARGUMENTS]) -> NodeId {
+        self.intern(Node::Field(field, part, at))
+    }
+
     /// A constant, by its bits: 0 and -0 differ, NaN equals itself.
     pub fn constant(&mut self, x: f64) -> NodeId {
         self.intern(Node::Const(x.to_bits()))
@@ -241,6 +266,7 @@ impl Graph {
                 Node::Curve(curve, part, x) => Node::Curve(curve, part, new[&x]),
                 Node::Piece(curve, part, i, x) => Node::Piece(curve, part, new[&i], new[&x]),
                 Node::Element(array, i) => Node::Element(array, new[&i]),
+                Node::Field(field, part, at) => Node::Field(field, part, at.map(|of| new[&of])),
             };
             let image = match replace(self, id, rebuilt) {
                 Some(image) => image,
@@ -252,6 +278,7 @@ impl Graph {
                     Node::Curve(curve, part, x) => self.curve(curve, part, x),
                     Node::Piece(curve, part, i, x) => self.piece(curve, part, i, x),
                     Node::Element(array, i) => self.element(array, i),
+                    Node::Field(field, part, at) => self.field(field, part, at),
                 },
             };
             new.insert(id, image);
@@ -293,12 +320,13 @@ impl Graph {
 
 impl Node {
     /// The operands in order; absent ones are `None`.
-    pub fn operands(self) -> [Option<NodeId>; 3] {
+    pub fn operands(self) -> [Option<NodeId>; 4] {
         match self {
-            Node::Const(_) | Node::Var(_) => [None; 3],
-            Node::Unary(_, a) | Node::Curve(_, _, a) | Node::Element(_, a) => [Some(a), None, None],
-            Node::Binary(_, a, b) | Node::Piece(_, _, a, b) => [Some(a), Some(b), None],
-            Node::Select(c, a, b) => [Some(c), Some(a), Some(b)],
+            Node::Const(_) | Node::Var(_) => [None; 4],
+            Node::Unary(_, a) | Node::Curve(_, _, a) | Node::Element(_, a) => [Some(a), None, None, None],
+            Node::Binary(_, a, b) | Node::Piece(_, _, a, b) => [Some(a), Some(b), None, None],
+            Node::Select(c, a, b) => [Some(c), Some(a), Some(b), None],
+            Node::Field(_, _, at) => at.map(Some),
         }
     }
 }

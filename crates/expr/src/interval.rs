@@ -5,7 +5,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::{Array, Binary, Curve, Part, Unary, Value};
+use super::{Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Part, Unary, Value};
 
 /// The numbers from `lo` to `hi`, or nothing where the expression is undefined on the whole set.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -245,5 +245,9 @@ impl Value for Interval {
 
     fn element(array: &Array, index: Interval) -> Interval {
         array.over(index)
+    }
+
+    fn field(field: &FieldSlot, part: FieldPart, at: [Interval; FIELD_ARGUMENTS]) -> Interval {
+        field.over(part, at)
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Truth values are numbers: 1 is true, 0 is false. A comparison with NaN is false, as in IEEE 754.
 
-use super::{Array, Curve, Part};
+use super::{Array, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Part};
 
 /// Functions and operators of one operand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -127,6 +127,8 @@ pub trait Value: Copy {
     fn piece(curve: &Curve, part: Part, index: Self, x: Self) -> Self;
     /// An element of an array.
     fn element(array: &Array, index: Self) -> Self;
+    /// A part of a field at a time and a place.
+    fn field(field: &FieldSlot, part: FieldPart, at: [Self; FIELD_ARGUMENTS]) -> Self;
 }
 
 fn truth(b: bool) -> f64 {
@@ -221,5 +223,9 @@ impl Value for f64 {
 
     fn element(array: &Array, index: f64) -> f64 {
         array.element(index)
+    }
+
+    fn field(field: &FieldSlot, part: FieldPart, at: [f64; FIELD_ARGUMENTS]) -> f64 {
+        field.value(part, at)
     }
 }

@@ -3,7 +3,10 @@
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
-use super::{Array, Binary, Curve, Graph, Lookup, Node, NodeId, Part, Unary, Value};
+use super::{
+    Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Graph, Lookup, Node, NodeId, Part, Unary,
+    Value,
+};
 
 /// A register: variables come first, then temporaries.
 type Register = u32;
@@ -22,6 +25,7 @@ enum Instruction {
     Curve(u32, Part, Register, Register),
     Piece(u32, Part, Register, Register, Register),
     Element(u32, Register, Register),
+    Field(u32, FieldPart, Register, [Register; FIELD_ARGUMENTS]),
 }
 
 impl Instruction {
@@ -35,20 +39,22 @@ impl Instruction {
             | Instruction::Select(to, ..)
             | Instruction::Curve(_, _, to, _)
             | Instruction::Piece(_, _, to, ..)
-            | Instruction::Element(_, to, _) => to,
+            | Instruction::Element(_, to, _)
+            | Instruction::Field(_, _, to, _) => to,
         }
     }
 
-    fn operands(self) -> [Option<Register>; 3] {
+    fn operands(self) -> [Option<Register>; 4] {
         match self {
-            Instruction::Const(..) => [None; 3],
+            Instruction::Const(..) => [None; 4],
             Instruction::Unary(_, _, a)
             | Instruction::Left(.., a)
             | Instruction::Right(_, _, a, _)
             | Instruction::Curve(.., a)
-            | Instruction::Element(.., a) => [Some(a), None, None],
-            Instruction::Binary(_, _, a, b) | Instruction::Piece(.., a, b) => [Some(a), Some(b), None],
-            Instruction::Select(_, c, a, b) => [Some(c), Some(a), Some(b)],
+            | Instruction::Element(.., a) => [Some(a), None, None, None],
+            Instruction::Binary(_, _, a, b) | Instruction::Piece(.., a, b) => [Some(a), Some(b), None, None],
+            Instruction::Select(_, c, a, b) => [Some(c), Some(a), Some(b), None],
+            Instruction::Field(.., at) => at.map(Some),
         }
     }
 }
@@ -93,11 +99,12 @@ pub struct Program {
     constants: Option<Vec<f64>>,
     curves: Vec<Arc<Curve>>,
     arrays: Vec<Arc<Array>>,
+    fields: Vec<FieldSlot>,
 }
 
-/// The curves or arrays that a program reads, each once.
+/// The curves, arrays or fields that a program reads, each once.
 struct Table<T> {
-    all: Vec<Arc<T>>,
+    all: Vec<T>,
     numbers: HashMap<Lookup, u32>,
 }
 
@@ -107,9 +114,9 @@ impl<T> Default for Table<T> {
     }
 }
 
-impl<T> Table<T> {
+impl<T: Clone> Table<T> {
     /// The number of an item, which is added if it is new.
-    fn number(&mut self, lookup: Lookup, item: &Arc<T>) -> u32 {
+    fn number(&mut self, lookup: Lookup, item: &T) -> u32 {
         *self.numbers.entry(lookup).or_insert_with(|| {
             self.all.push(item.clone());
             self.all.len() as u32 - 1
@@ -126,12 +133,12 @@ fn constant(graph: &Graph, id: NodeId) -> f64 {
 }
 
 /// The operands of a node that are read from registers: a constant operand stands in the instruction.
-fn in_registers(graph: &Graph, id: NodeId) -> [Option<NodeId>; 3] {
+fn in_registers(graph: &Graph, id: NodeId) -> [Option<NodeId>; 4] {
     let node = graph.node(id);
     let is_constant = |id: NodeId| matches!(graph.node(id), Node::Const(_));
     match node {
-        Node::Binary(_, a, b) if is_constant(a) && !is_constant(b) => [None, Some(b), None],
-        Node::Binary(_, a, b) if is_constant(b) && !is_constant(a) => [Some(a), None, None],
+        Node::Binary(_, a, b) if is_constant(a) && !is_constant(b) => [None, Some(b), None, None],
+        Node::Binary(_, a, b) if is_constant(b) && !is_constant(a) => [Some(a), None, None, None],
         _ => node.operands(),
     }
 }
@@ -162,8 +169,9 @@ struct Compiler<'g> {
     free: Vec<Register>,
     /// Number of registers so far.
     registers: Register,
-    curves: Table<Curve>,
-    arrays: Table<Array>,
+    curves: Table<Arc<Curve>>,
+    arrays: Table<Arc<Array>>,
+    fields: Table<FieldSlot>,
 }
 
 impl Compiler<'_> {
@@ -187,21 +195,27 @@ impl Compiler<'_> {
         match (graph.node(id), operands) {
             (Node::Const(bits), _) => Instruction::Const(to, f64::from_bits(bits)),
             (Node::Unary(op, _), [Some(a), ..]) => Instruction::Unary(op, to, a),
-            (Node::Binary(Binary::Mul, ..), [Some(a), Some(b), _]) if a == b => {
+            (Node::Binary(Binary::Mul, ..), [Some(a), Some(b), ..]) if a == b => {
                 Instruction::Unary(Unary::Square, to, a)
             }
-            (Node::Binary(op, ..), [Some(a), Some(b), _]) => Instruction::Binary(op, to, a, b),
-            (Node::Binary(op, x, _), [None, Some(b), _]) => Instruction::Left(op, to, constant(graph, x), b),
-            (Node::Binary(op, _, x), [Some(a), None, _]) => Instruction::Right(op, to, a, constant(graph, x)),
-            (Node::Select(..), [Some(c), Some(a), Some(b)]) => Instruction::Select(to, c, a, b),
+            (Node::Binary(op, ..), [Some(a), Some(b), ..]) => Instruction::Binary(op, to, a, b),
+            (Node::Binary(op, x, _), [None, Some(b), ..]) => Instruction::Left(op, to, constant(graph, x), b),
+            (Node::Binary(op, _, x), [Some(a), None, ..]) => {
+                Instruction::Right(op, to, a, constant(graph, x))
+            }
+            (Node::Select(..), [Some(c), Some(a), Some(b), _]) => Instruction::Select(to, c, a, b),
             (Node::Curve(curve, part, _), [Some(a), ..]) => {
                 Instruction::Curve(self.curves.number(curve, graph.curve_of(curve)), part, to, a)
             }
-            (Node::Piece(curve, part, ..), [Some(i), Some(a), _]) => {
+            (Node::Piece(curve, part, ..), [Some(i), Some(a), ..]) => {
                 Instruction::Piece(self.curves.number(curve, graph.curve_of(curve)), part, to, i, a)
             }
             (Node::Element(array, _), [Some(i), ..]) => {
                 Instruction::Element(self.arrays.number(array, graph.array_of(array)), to, i)
+            }
+            (Node::Field(field, part, _), [Some(t), Some(x), Some(y), Some(z)]) => {
+                let number = self.fields.number(field, graph.field_of(field));
+                Instruction::Field(number, part, to, [t, x, y, z])
             }
             _ => unreachable!("a node has the operands of its kind"),
         }
@@ -223,6 +237,7 @@ impl Program {
             registers: variables as Register,
             curves: Table::default(),
             arrays: Table::default(),
+            fields: Table::default(),
         };
         let mut code = Vec::new();
         for id in order {
@@ -245,9 +260,9 @@ impl Program {
             .collect();
         reads.sort_unstable();
         reads.dedup();
-        let Compiler { curves, arrays, registers, .. } = compiler;
-        let (curves, arrays, registers) = (curves.all, arrays.all, registers as usize);
-        Program { constants, curves, arrays, code, outputs, variables, registers, reads }
+        let Compiler { curves, arrays, fields, registers, .. } = compiler;
+        let (curves, arrays, fields, registers) = (curves.all, arrays.all, fields.all, registers as usize);
+        Program { constants, curves, arrays, fields, code, outputs, variables, registers, reads }
     }
 
     /// Number of values that an evaluation gives.
@@ -258,6 +273,12 @@ impl Program {
     /// The variables that it reads, ascending.
     pub fn reads(&self) -> &[usize] {
         &self.reads
+    }
+
+    /// The least time within which a field that it reads changes much ([`Field::stretch`](crate::Field::stretch)); infinite if it reads none.
+    pub fn stretch(&self) -> f64 {
+        let fields = self.fields.iter().filter_map(FieldSlot::get);
+        fields.map(|field| field.stretch()).fold(f64::INFINITY, f64::min)
     }
 
     /// The outputs, if they depend on nothing.
@@ -330,6 +351,9 @@ impl Program {
                 Instruction::Element(array, to, i) => {
                     (to, T::element(&self.arrays[array as usize], scratch[i as usize]))
                 }
+                Instruction::Field(field, part, to, at) => {
+                    (to, T::field(&self.fields[field as usize], part, at.map(|of| scratch[of as usize])))
+                }
             };
             scratch[to as usize] = value;
         }
@@ -398,6 +422,12 @@ impl Program {
                 Instruction::Element(array, to, i) => {
                     let array = &self.arrays[array as usize];
                     each(registers, parts, [to, i, i], |i, _| array.element(i));
+                }
+                Instruction::Field(field, part, to, at) => {
+                    let (field, at) = (&self.fields[field as usize], at.map(|of| registers[of as usize]));
+                    let value = |i: usize| field.value(part, [at[0][i], at[1][i], at[2][i], at[3][i]]);
+                    registers[to as usize] =
+                        std::array::from_fn(|i| if i < rows { value(i) } else { f64::NAN });
                 }
             }
         }

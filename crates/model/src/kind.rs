@@ -65,11 +65,14 @@ pub enum Quantity {
     Strain,
     /// `force_x`, `force_y`, `force_z`: what sheets do to the solid that the module draws, by the axis; in kg·length/time².
     Force(usize),
+    /// `ground(x, z)` where soil may move: the number of the heights that hold from a tick to the next one, which the field of
+    /// [`Scenery::heights`](crate::Scenery::heights) has as an argument. Its slope is always 0.
+    Ground,
 }
 
 impl Quantity {
-    /// All, in their order.
-    pub const ALL: [Quantity; 4] =
+    /// Those that rules read by a name alone, in their order.
+    pub const NAMED: [Quantity; 4] =
         [Quantity::Strain, Quantity::Force(0), Quantity::Force(1), Quantity::Force(2)];
 
     /// The name in rules.
@@ -79,6 +82,7 @@ impl Quantity {
             Quantity::Force(0) => "force_x",
             Quantity::Force(1) => "force_y",
             Quantity::Force(_) => "force_z",
+            Quantity::Ground => "ground",
         }
     }
 

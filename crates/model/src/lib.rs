@@ -133,9 +133,25 @@ impl Model {
         self.kinds.iter().any(|(_, kind)| kind.reads_force())
     }
 
+    /// True if some rule reads the height of ground that may move.
+    pub fn reads_ground(&self) -> bool {
+        self.kinds.iter().any(|(_, kind)| kind.input_parameter(Quantity::Ground).is_some())
+    }
+
     /// True if some rule reads anything that the surroundings give.
     pub fn reads_inputs(&self) -> bool {
         self.kinds.iter().any(|(_, kind)| kind.read_inputs().next().is_some())
+    }
+
+    /// The least time within which a field changes much that rules read ([`Program::stretch`](dlsys_expr::Program::stretch)).
+    pub fn stretch(&self) -> f64 {
+        let of_solve = |solve: &Solve| solve.rates.stretch().min(solve.algebraic.values.stretch());
+        let of_rule = |rule: &Rule| {
+            let terms = rule.aggregates.iter().map(|aggregate| aggregate.term.stretch());
+            let solves = rule.solves.iter().map(of_solve);
+            terms.chain(solves).fold(rule.sides.stretch(), f64::min)
+        };
+        self.rules.iter().map(of_rule).fold(f64::INFINITY, f64::min)
     }
 
     /// The names of a kind's parameters: as in its first rule, or else their numbers.

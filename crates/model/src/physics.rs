@@ -161,7 +161,7 @@ pub enum Primitive {
     Vortex,
 }
 
-/// A place for the field that is made of the declarations of the wind, once for the model and its copies.
+/// A place for a field that is made of declarations, of the wind or of the ground, once for the model and its copies.
 #[derive(Clone, Debug, Default)]
 pub struct FieldCache(Arc<OnceLock<Arc<dyn Any + Send + Sync>>>);
 

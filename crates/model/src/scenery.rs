@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{Bed, FieldCache, Flow, Gas, KindId, Model, Pour, Rgb, Sheet, Soil, Tissue, Units, Wind};
 use dlsys_diagnostic::{Source, Span};
-use dlsys_expr::Program;
+use dlsys_expr::{FieldSlot, Program};
 
 /// The declarations of a model that concern its surroundings: `plant`, `light`, `sky`, `camera`, `ground`, `units`, `wind`, `flow`,
 /// `tissue`, `gas`, `sheet`, `solid`, `shelf`, `soil`, `pour`.
@@ -44,6 +44,14 @@ pub struct Scenery {
     pub pours: Vec<Pour>,
     /// The field of the wind.
     pub field: FieldCache,
+    /// The height of soil in units of the model that rules read, as a field of t, x, the number of its state, and z. Simulations put it there.
+    pub heights: Option<FieldSlot>,
+    /// The field of the heights.
+    pub layers: FieldCache,
+    /// The first place in rules and drawings that reads the wind.
+    pub flow_reader: Option<Span>,
+    /// The turbulence that they read, relative to its amplitude, in m/s at times and places of the model. Simulations put it there.
+    pub eddies: Option<FieldSlot>,
 }
 
 /// `camera at X, Y, Z towards X, Y, Z angle A`

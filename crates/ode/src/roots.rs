@@ -12,7 +12,8 @@
 //!   at the start itself is not a root: it belongs to the search before.
 //! - The first root is returned: an instant at which the sign becomes another, or zero is touched.
 //! - Zero means within `tolerance`, which should stand for the rounding of the function's values.
-//! - Work is bounded: after `MAX_PIECES` stretches the rest is judged by the signs at their ends only.
+//! - Work is bounded: after `MAX_PIECES` stretches the rest is judged by the signs at their ends only. A function that varies fast gives the length of a
+//!   part of the step that is searched with so many of them.
 
 use dlsys_expr::Sign;
 use dlsys_expr::{Dual, Interval};
@@ -29,6 +30,10 @@ pub trait Function {
     fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval>;
     /// The value at a position; NaN where it is undefined.
     fn value(&mut self, at: f64) -> f64;
+    /// The length of a part of the step within which the function does not vary often.
+    fn stretch(&self) -> f64 {
+        f64::INFINITY
+    }
 }
 
 /// A root found by [`first_root`].
@@ -55,20 +60,28 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
     }
     // Off zero: a root from here on is one that was not there before.
     search.armed = first != Sign::Zero;
-    let mut stack = vec![(from, to)];
-    let mut pieces = 0;
-    while let Some((lo, hi)) = stack.pop() {
-        pieces += 1;
-        match search.examine(lo, hi, pieces > MAX_PIECES) {
-            Finding::Nothing => {}
-            Finding::Root(root) => return Some(root),
-            Finding::Halve => {
-                let middle = 0.5 * (lo + hi);
-                stack.extend([(middle, hi), (lo, middle)]);
+    let stretch = search.f.stretch().max(NARROW);
+    let (mut begin, mut stack) = (from, Vec::new());
+    loop {
+        let end = if begin + stretch < to { begin + stretch } else { to };
+        stack.push((begin, end));
+        let mut pieces = 0;
+        while let Some((lo, hi)) = stack.pop() {
+            pieces += 1;
+            match search.examine(lo, hi, pieces > MAX_PIECES) {
+                Finding::Nothing => {}
+                Finding::Root(root) => return Some(root),
+                Finding::Halve => {
+                    let middle = 0.5 * (lo + hi);
+                    stack.extend([(middle, hi), (lo, middle)]);
+                }
             }
         }
+        if end == to {
+            return None;
+        }
+        begin = end;
     }
-    None
 }
 
 /// The state of a search, which goes from stretch to stretch in the order of position.
@@ -415,5 +428,41 @@ mod tests {
         });
         let root = first_root(&mut f, 0.0, 1.0, Sign::Minus, 1e-15).expect("a root");
         assert!((root.position - std::f64::consts::FRAC_PI_6 / 6000.0).abs() < 1e-15, "{root:?}");
+    }
+
+    /// 1 but for a dip of a width of 1e-4 at 0.9, with bounds that are of use over short stretches only.
+    struct Dip {
+        stretch: f64,
+    }
+
+    impl Function for Dip {
+        fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
+            let near = hi > 0.899 && lo < 0.901;
+            let value = match (hi - lo > 1e-4, near) {
+                (true, _) => Interval { lo: -1.0, hi: 1.0, partial: false },
+                (_, true) => Interval::ENTIRE,
+                _ => Interval { lo: 0.9, hi: 1.0, partial: false },
+            };
+            Dual { value, rate: Interval::ENTIRE }
+        }
+
+        fn value(&mut self, at: f64) -> f64 {
+            let x = (at - 0.9) / 1e-4;
+            1.0 - 1.5 * (-x * x).exp()
+        }
+
+        fn stretch(&self) -> f64 {
+            self.stretch
+        }
+    }
+
+    #[test]
+    fn what_varies_fast_is_searched_in_stretches() {
+        let find = |stretch: f64| first_root(&mut Dip { stretch }, 0.0, 1.0, Sign::Plus, 1e-12);
+        let exact = 0.9 - 1e-4 * f64::sqrt(f64::ln(1.5));
+        let root = find(0.01).expect("there is one");
+        assert!((root.position - exact).abs() < 1e-11 && root.after == Sign::Minus, "{root:?}");
+        // At once, it takes more pieces than there may be.
+        assert!(find(f64::INFINITY).is_none_or(|root| (root.position - exact).abs() > 1e-6));
     }
 }

@@ -195,8 +195,12 @@ impl Session {
         settings: &[Setting],
         files: &dyn Files,
     ) -> Result<Session, Box<LoadError>> {
-        let loaded = dlsys_compile::load_with(&source, settings, files);
+        let mut loaded = dlsys_compile::load_with(&source, settings, files);
         let source = loaded.source.unwrap_or(source);
+        if let Some(Err(error)) = loaded.model.as_ref().map(dlsys_surround::bind) {
+            loaded.model = None;
+            loaded.diagnostics.insert(0, error.diagnostic());
+        }
         match loaded.model {
             Some(model) => {
                 Ok(Session { source, model, warnings: loaded.diagnostics, inputs: vec![], folders: vec![] })

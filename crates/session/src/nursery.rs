@@ -376,9 +376,17 @@ impl<'m> Nursery<'m> {
 
     pub(crate) fn start(&self, plant: &'m model::Plant, seed: u64) -> Result<Simulation<'m>, DrawError> {
         let settings = Settings { seed, ..self.settings };
-        if plant.model.reads_inputs() {
+        let reads_wind = plant.model.scenery.flow_reader.is_some();
+        if plant.model.reads_inputs() || reads_wind {
             // Each would grow in another way, at its own place.
             let (what, why) = match plant.model.reads_strain() {
+                _ if reads_wind => {
+                    ("the wind", "the wind of a scene is not yet known to the rules of its plants")
+                }
+                false if plant.model.reads_ground() => (
+                    "the height of soil",
+                    "the ground of a scene is not yet known to the rules of its plants",
+                ),
                 true => ("`strain`", "a plant in another model bends, but its rules cannot read that yet"),
                 false => {
                     ("the force of sheets", "sheets of the model around a plant do not push what it draws")

@@ -286,6 +286,13 @@ impl Error {
         }
     }
 
+    /// The error of surroundings that cannot begin.
+    pub fn of_beginning(failure: Failure) -> Error {
+        let site = crate::world::site_of_axiom(0.0);
+        let span = failure.span.unwrap_or(site.span);
+        Error::Surroundings { site: Site { span, ..site }, failure: Box::new(failure) }
+    }
+
     /// The message as it is drawn.
     pub fn diagnostic(&self) -> Diagnostic {
         let site = self.site();

@@ -31,6 +31,8 @@ pub struct Setup<'m> {
     pub plain: bool,
     /// Some rule reads what the surroundings give.
     pub reads_inputs: bool,
+    /// Some rule reads the height of ground that may move.
+    pub reads_ground: bool,
     /// Some parameters are algebraic.
     pub is_algebraic: bool,
     /// Some rates may have pulses.
@@ -62,6 +64,7 @@ impl<'m> Setup<'m> {
             gathers,
             plain: !hands_on && !gathers && !is_algebraic && !is_discrete && !settings.transitions,
             reads_inputs: model.reads_inputs(),
+            reads_ground: model.reads_ground(),
             is_algebraic,
             has_pulses: solves().any(|solve| solve.has_pulses),
         }

@@ -1,6 +1,6 @@
 //! Surroundings: what acts on the modules from outside, on a grid of time of its own, as the bending of stems does.
 //!
-//! At each tick the surroundings get the string and give, for each module that reads `strain` or a force, the values up to the next tick. From
+//! At each tick the surroundings get the string and give, for each module that reads `strain`, a force or the ground, the values up to the next tick. From
 //! tick to tick they are linear in time: a strain from its present value on, so it is continuous; a force from a new one. To all stages each is a parameter
 //! that moves at a constant rate: the tick changes the slope, and the modules concerned begin new trajectories, as they do when a neighbour changes.
 //!
@@ -54,6 +54,7 @@ pub struct Inputs {
     readers: Vec<usize>,
     strain: Vec<f64>,
     forces: Vec<Force>,
+    ground: f64,
     productions: Vec<Event>,
 }
 
@@ -76,6 +77,11 @@ impl Inputs {
     /// The force on the solid of each reader, in the order of [`Inputs::readers`]. They are 0 at first.
     pub fn forces_mut(&mut self) -> &mut [Force] {
         &mut self.forces
+    }
+
+    /// Sets the number of the heights of the ground that hold from now on; 0 is the ground at the beginning.
+    pub fn set_ground(&mut self, number: f64) {
+        self.ground = number;
     }
 
     /// The productions since the last tick, or since t = 0, in the order of time.
@@ -297,9 +303,10 @@ impl<'m> Simulation<'m> {
     /// Lets modules go on with what they are given for a duration; returns how many of them begin new trajectories.
     fn hand(&mut self, readers: &Readers, duration: f64, now: SimTime) -> Result<u64, Error> {
         let mut restarts = 0;
+        self.world.ground = readers.inputs.ground;
         for (i, &id) in readers.modules.iter().enumerate() {
             let (strain, force) = (readers.inputs.strain[i], readers.inputs.forces[i]);
-            match self.take_inputs(id, (strain, force), duration, now) {
+            match self.take_inputs(id, (strain, force, readers.inputs.ground), duration, now) {
                 Ok(restarted) => restarts += u64::from(restarted),
                 Err(quantity) => {
                     let why = match quantity {
@@ -308,6 +315,7 @@ impl<'m> Simulation<'m> {
                             let [from, to] = force[axis].map(|value| brief(value, 6));
                             format!("`{}` goes from {from} to {to}", quantity.name())
                         }
+                        Quantity::Ground => "the ground has no height".to_owned(),
                     };
                     let failure = Failure::new(why).of(readers.inputs.readers[i]);
                     return Err(self.failure(failure, readers));
@@ -324,7 +332,7 @@ impl<'m> Simulation<'m> {
     fn take_inputs(
         &mut self,
         id: ModuleId,
-        (strain, force): (f64, Force),
+        (strain, force, ground): (f64, Force, f64),
         duration: f64,
         now: SimTime,
     ) -> Result<bool, Quantity> {
@@ -336,6 +344,7 @@ impl<'m> Simulation<'m> {
             let [value, end] = match quantity {
                 Quantity::Strain => [present, strain],
                 Quantity::Force(axis) => force[axis],
+                Quantity::Ground => [ground, ground],
             };
             let slope = if value == end { 0.0 } else { (end - value) / duration };
             if !slope.is_finite() || !end.is_finite() {
@@ -388,6 +397,14 @@ impl World {
         let start = self.tree.places(id).start;
         for (parameter, value) in given {
             self.tree.set_value(start + parameter, *value);
+        }
+    }
+
+    /// Gives a new module the present state of the ground, if it reads the ground.
+    pub fn put_on_ground(&mut self, model: &Model, id: ModuleId) {
+        if let Some(parameter) = model.kinds.get(self.tree.kind(id)).input_parameter(Quantity::Ground) {
+            let start = self.tree.places(id).start;
+            self.tree.set_value(start + parameter, self.ground);
         }
     }
 

@@ -14,9 +14,11 @@ use dlsys_tree::ModuleString;
 use crate::bending::{Bending, Tick};
 use crate::course::LOOK_BACK;
 use crate::descent::Descent;
+use crate::layers;
 use crate::motion::Passive;
 use crate::place::Place;
 use crate::pushed;
+use crate::reading;
 use crate::weather::{Sampler, Weather};
 use crate::{CLOCK, Error};
 
@@ -25,8 +27,12 @@ use crate::{CLOCK, Error};
 /// # Errors
 /// As of [`Simulation::new`], and if the wind has no meaning.
 pub fn start<'m>(model: &'m Model, settings: Settings, place: Place) -> Result<Simulation<'m>, sim::Error> {
+    reading::bind(model).map_err(|error| beginning(&error))?;
     if model.reads_force() {
         return pushed::start(model, settings, place);
+    }
+    if let Some(layers) = reading::layers(model).map_err(|error| beginning(&error))? {
+        return layers::start(model, settings, (place, layers));
     }
     if !model.reads_strain() || model.scenery.tissues.is_empty() {
         return Simulation::new(model, settings);
@@ -36,6 +42,11 @@ pub fn start<'m>(model: &'m Model, settings: Settings, place: Place) -> Result<S
     let time = place.time_of(place.first_tick()).max(0.0);
     let coupled = Coupled { model: shared, place, solver, course: None, time };
     Simulation::with_surroundings(model, settings, Box::new(coupled))
+}
+
+/// The error of surroundings that cannot begin.
+fn beginning(error: &Error) -> sim::Error {
+    sim::Error::of_beginning(failure(error, &ModuleString::default()))
 }
 
 /// The stems of a model in lock step with its growth.

@@ -211,6 +211,18 @@ pub enum Error {
         /// The place in the text that says how it is drawn, or its name in the declaration of solids.
         span: Span,
     },
+    /// Growth that reads the height of the ground, and the ground that it presses, do not agree on a tick.
+    #[error("growth and the ground that it reads and presses do not agree at t = {}", brief(*.time, 8))]
+    GroundApart {
+        /// How far heights are apart, in units of the model.
+        by: f64,
+        /// The largest distance that is allowed, in units of the model.
+        allowed: f64,
+        /// The time in units of the model.
+        time: f64,
+        /// The declaration of the ground.
+        span: Span,
+    },
     /// Too many points of sheets.
     #[error("sheets have more than {most} points at t = {}", brief(*.time, 8))]
     TooManySheets {
@@ -348,6 +360,14 @@ impl Error {
             Error::TooManySheets { span, .. } => Diagnostic::error(self.to_string())
                 .at(*span, "this one is too many")
                 .help("place fewer sheets, or give them coarser meshes: 1,000 points make a smooth flag"),
+            Error::GroundApart { by, allowed, span, .. } => Diagnostic::error(self.to_string())
+                .at(*span, "this ground")
+                .note(format!(
+                    "within a tick of 1/120 s heights differ by {} from what rules read, and may by {}",
+                    brief(*by, 3),
+                    brief(*allowed, 3)
+                ))
+                .help("a body whose place follows the ground below it at once sinks without end: let it move by a velocity, or read the ground beside it; a larger `--bend-tolerance` allows more"),
             Error::Coupling { fault, span, .. } => {
                 advice::of_coupling(*fault, Diagnostic::error(self.to_string()).at(*span, "what is drawn here"))
             }

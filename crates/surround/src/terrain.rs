@@ -5,6 +5,9 @@
 //! ```
 //!
 //! What is seen at a time is the ground at the tick at or before it. Where nothing can touch it any more, ticks pass at no cost.
+//!
+//! If rules read the height of the ground, and bodies of the model press it, each acts on the other. A tick is then gone through with a guess of the ground at its
+//! end, first that of its beginning and then what came out, until both agree; in between, heights are linear in time ([`Layers`]).
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -14,16 +17,18 @@ use dlsys_geometry::scene::{self, MaterialId, Point, Scene};
 use dlsys_geometry::turtle;
 use dlsys_ground::{self as ground, Description, Extent, Ground};
 use dlsys_model::{Bed, Model, Soil, SoilBase};
-use dlsys_sim::{Settings, Simulation};
+use dlsys_sim::{Inputs, Settings, Simulation};
 use dlsys_tree::ModuleString;
 
 use crate::Error;
 use crate::coupled;
 use crate::descent::Descent;
+use crate::layers::{Layer, Layers};
 use crate::marks::{Marks, Recent};
 use crate::motion::{MOST_TICKS, Motion};
 use crate::place::Place;
 use crate::pressing::{Placed, placed};
+use crate::reading;
 
 /// Ticks of the ground in a second.
 pub const TICKS: f64 = 120.0;
@@ -37,6 +42,8 @@ const MEMORY: usize = 1024;
 const MOST_KEPT: usize = 4_000_000;
 /// Patches of bodies are as near to theirs as this part of a column.
 const ACCURACY: f64 = 0.1;
+/// Most times that growth goes through a tick with the ground that it reads.
+const PASSES: usize = 12;
 
 /// The ground of a model.
 pub struct Terrain<'m> {
@@ -45,6 +52,8 @@ pub struct Terrain<'m> {
     pub(crate) place: Place,
     /// Some module may draw a body or a shelf.
     has_bodies: bool,
+    /// What rules read of the ground, if they do.
+    layers: Option<Arc<Layers>>,
     pub(crate) state: Mutex<State<'m>>,
 }
 
@@ -54,6 +63,15 @@ pub(crate) struct Moment {
     number: u64,
     pub(crate) ground: Ground,
     bodies: Arc<Vec<Placed>>,
+    /// What rules read from the tick before to this one.
+    layer: Option<Arc<Layer>>,
+}
+
+/// What rules read from a tick on.
+pub(crate) struct PassedTick {
+    pub(crate) layer: Arc<Layer>,
+    /// The ground may change at a later tick.
+    pub(crate) goes_on: bool,
 }
 
 /// A moment to go on from.
@@ -61,6 +79,8 @@ pub(crate) struct Moment {
 struct Course<'m> {
     growth: Simulation<'m>,
     moment: Moment,
+    /// What rules read up to the tick before.
+    held: Option<Arc<Layer>>,
 }
 
 pub(crate) struct State<'m> {
@@ -68,6 +88,8 @@ pub(crate) struct State<'m> {
     /// The bodies of the start are known.
     has_begun: bool,
     present: Option<Course<'m>>,
+    /// The tick in which growth fails, with what it read until then.
+    broken: Option<(u64, Arc<Layer>)>,
     /// Moments that were asked for: they may be asked for again.
     kept: Recent<Moment>,
     marks: Marks<Course<'m>>,
@@ -102,28 +124,23 @@ impl<'m> Terrain<'m> {
     /// # Errors
     /// A ground whose values are out of range.
     pub fn new(model: &'m Model, settings: Settings, threads: usize) -> Result<Option<Terrain<'m>>, Error> {
-        let Some(bed) = &model.scenery.bed else { return Ok(None) };
         let place = Place::of_scene(&model.scenery);
+        reading::bind(model)?;
+        let Some(ground) = self::ground(model, &place, threads)? else { return Ok(None) };
         let settings = Settings { log: true, transitions: false, ..settings };
-        let description = describe(bed, &model.scenery.soils[bed.soil], place.units.length);
-        let of_ground = ground::Settings {
-            tick: 1.0 / TICKS,
-            threads: threads.clamp(1, 1024),
-            memory: MEMORY,
-            ..ground::Settings::default()
+        let layers = reading::layers(model)?;
+        let growth = match layers.is_some() {
+            // It reads what is computed here.
+            true => Simulation::new(model, settings)?,
+            false => coupled::start(model, settings, place)?,
         };
-        let ground = Ground::new(description, of_ground).map_err(|error| Error::Ground {
-            error,
-            time: 0.0,
-            metre: place.units.length,
-            span: bed.span,
-        })?;
-        let growth = coupled::start(model, settings, place)?;
-        let moment = Moment { number: 0, ground, bodies: Arc::default() };
+        let layer = layers.as_ref().map(|layers| layers.start());
+        let moment = Moment { number: 0, ground, bodies: Arc::default(), layer };
         let state = State {
-            start: Course { growth, moment },
+            start: Course { growth, moment, held: None },
             has_begun: false,
             present: None,
+            broken: None,
             kept: Recent::new(MOST_KEPT),
             marks: Marks::new(MOST_KEPT),
             spent: Duration::ZERO,
@@ -131,7 +148,7 @@ impl<'m> Terrain<'m> {
             mesh: None,
         };
         let has_bodies = !model.scenery.solids.is_empty() || !model.scenery.shelves.is_empty();
-        Ok(Some(Terrain { model, settings, place, has_bodies, state: Mutex::new(state) }))
+        Ok(Some(Terrain { model, settings, place, has_bodies, layers, state: Mutex::new(state) }))
     }
 
     /// The surface of the ground, and of what lies on bodies, at a time of the model, in its units, of a material. Stems move as they do here.
@@ -193,8 +210,41 @@ impl<'m> Terrain<'m> {
         motion: Option<&Motion<'m>>,
     ) -> Result<Moment, Error> {
         let number = (self.place.seconds(time).max(0.0) * TICKS + SLACK).floor();
+        self.reach_tick(state, number, motion)
+    }
+
+    /// What rules read from a tick on, up to the next one; `None` if they read nothing of the ground.
+    ///
+    /// # Errors
+    /// As of [`Terrain::at`], unless growth fails within the tick: then it is what it reads until then.
+    pub(crate) fn layer(&self, number: u64) -> Result<Option<PassedTick>, Error> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        match self.reach_tick(&mut state, number as f64 + 1.0, None) {
+            Ok(Moment { layer, ground, .. }) => {
+                Ok(layer.map(|layer| PassedTick { layer, goes_on: !self.rests(&ground) }))
+            }
+            Err(error) => match state.broken.take() {
+                Some((tick, layer)) if tick == number => Ok(Some(PassedTick { layer, goes_on: false })),
+                _ => Err(error),
+            },
+        }
+    }
+
+    /// Nothing can move a ground any more.
+    fn rests(&self, ground: &Ground) -> bool {
+        !self.has_bodies && self.model.scenery.pours.is_empty() && ground.is_at_rest()
+    }
+
+    fn reach_tick(
+        &self,
+        state: &mut State<'m>,
+        number: f64,
+        motion: Option<&Motion<'m>>,
+    ) -> Result<Moment, Error> {
+        // Stems that bend have a growth of their own, which reads the ground that is computed here.
+        let motion = motion.filter(|_| self.layers.is_none());
         if number > MOST_TICKS {
-            let seconds = self.place.units.time;
+            let (seconds, time) = (self.place.units.time, self.place.time_at(number / TICKS));
             return Err(Error::TooLong { most: MOST_TICKS, time, seconds, span: self.span() });
         }
         let begun = Instant::now();
@@ -235,8 +285,11 @@ impl<'m> Terrain<'m> {
         };
         while present.moment.number < number {
             in_time(self.time_of(present.moment.number))?;
-            if !self.has_bodies && self.model.scenery.pours.is_empty() && present.moment.ground.is_at_rest() {
-                present.moment.number = number;
+            if self.rests(&present.moment.ground) {
+                let Moment { number: from, ground, layer, .. } = &present.moment;
+                let still =
+                    self.layers.as_ref().map(|layers| self.still(layers, (*from, ground), layer.as_ref()));
+                (present.moment.number, present.moment.layer) = (number, still);
                 break;
             }
             self.tick(&mut present, state, motion)?;
@@ -260,7 +313,11 @@ impl<'m> Terrain<'m> {
         state: &mut State<'m>,
         motion: Option<&Motion<'m>>,
     ) -> Result<(), Error> {
+        if let Some(layers) = self.layers.as_ref().filter(|_| self.has_bodies) {
+            return self.tick_together(layers, course, state);
+        }
         let next = course.moment.number + 1;
+        let first = self.layers.as_ref().map(|_| course.moment.ground.clone());
         let mut bodies = Vec::new();
         if self.has_bodies {
             let mut string = ModuleString::default();
@@ -274,8 +331,82 @@ impl<'m> Terrain<'m> {
         let done = course.moment.ground.advance(&pours, &moving);
         done.map_err(|error| self.failed(error, self.time_of(next)))?;
         course.moment.bodies = Arc::new(bodies);
+        if let (Some(layers), Some(first)) = (&self.layers, first) {
+            let span = self.span_of(course.moment.number);
+            course.moment.layer = Some(layers.add(span, first, Some(course.moment.ground.clone())));
+        }
         course.moment.number = next;
         Ok(())
+    }
+
+    /// Goes on to the next tick, with growth that reads the ground until then.
+    fn tick_together(
+        &self,
+        layers: &Layers,
+        course: &mut Course<'m>,
+        state: &mut State<'m>,
+    ) -> Result<(), Error> {
+        let Moment { number, ground: first, bodies: past, layer: before } = course.moment.clone();
+        let (span, pours) = (self.span_of(number), self.pours(number + 1)?);
+        let mut layer = self.still(layers, (number, &first), before.as_ref());
+        let mut guess = first.clone();
+        let mut apart = 0.0;
+        for _ in 0..PASSES {
+            let mut growth = course.growth.clone();
+            let mut string = ModuleString::default();
+            let read = |_: &ModuleString, inputs: &mut Inputs| inputs.set_ground(layer.number as f64);
+            let gone =
+                growth.give(span, read).and_then(|()| growth.at(self.time_of(number + 1), &mut string));
+            if let Err(error) = gone {
+                state.broken = Some((number, layer));
+                return Err(error.into());
+            }
+            let mut descent = Descent::default();
+            descent.add(self.model, &growth.take_events());
+            let bodies = self.bodies(&string, &past, &descent, state, None)?;
+            let moving: Vec<ground::Body> = bodies.iter().map(Placed::moving).collect();
+            let mut ground = first.clone();
+            let done = ground.advance(&pours, &moving);
+            done.map_err(|error| self.failed(error, self.time_of(number + 1)))?;
+            apart = distance(&ground, &guess);
+            if apart <= self.allowed() {
+                let bodies = Arc::new(bodies);
+                // The layer before is still read by what happened up to the tick.
+                course.held = before;
+                course.growth = growth;
+                course.moment = Moment { number: number + 1, ground, bodies, layer: Some(layer) };
+                return Ok(());
+            }
+            layer = layers.add(span, first.clone(), Some(ground.clone()));
+            guess = ground;
+        }
+        let (time, allowed) = (self.time_of(number), self.allowed());
+        let metre = self.place.units.length;
+        Err(Error::GroundApart { by: apart / metre, allowed: allowed / metre, time, span: self.span() })
+    }
+
+    /// How far the ground that growth reads may be from what comes out, in m.
+    fn allowed(&self) -> f64 {
+        let cell = self.model.scenery.bed.as_ref().map_or(1.0, |bed| bed.cell);
+        self.settings.bending.tolerance * cell * self.place.units.length
+    }
+
+    /// A layer of a ground that does not move: the one before, if that has been so.
+    fn still(
+        &self,
+        layers: &Layers,
+        (number, ground): (u64, &Ground),
+        before: Option<&Arc<Layer>>,
+    ) -> Arc<Layer> {
+        match before.filter(|before| before.stays_at(ground) && self.model.scenery.pours.is_empty()) {
+            Some(before) => Arc::clone(before),
+            None => layers.add(self.span_of(number), ground.clone(), None),
+        }
+    }
+
+    /// The time of the model at a tick, and up to the next one.
+    fn span_of(&self, number: u64) -> (f64, f64) {
+        (self.time_of(number), 1.0 / (TICKS * self.place.units.time))
     }
 
     /// The bodies of a string, each with its place in that of the tick before.
@@ -344,7 +475,8 @@ impl<'m> Terrain<'m> {
         scene::Mesh::of_triangles(points, &[], triangles)
     }
 
-    fn time_of(&self, number: u64) -> f64 {
+    /// The time of the model at a tick.
+    pub(crate) fn time_of(&self, number: u64) -> f64 {
         self.place.time_at(number as f64 / TICKS)
     }
 
@@ -379,6 +511,37 @@ impl<'m> Terrain<'m> {
 /// Points in m in units of the model.
 pub(crate) fn from_metres(points: &[ground::Vector], metre: f64) -> Vec<Point> {
     points.iter().map(|point| Point::from(point / metre)).collect()
+}
+
+/// The ground of a model at the beginning; `None` if none is declared that gives way.
+///
+/// # Errors
+/// Values that are out of range.
+pub(crate) fn ground(model: &Model, place: &Place, threads: usize) -> Result<Option<Ground>, Error> {
+    let Some(bed) = &model.scenery.bed else { return Ok(None) };
+    let metre = place.units.length;
+    let description = describe(bed, &model.scenery.soils[bed.soil], metre);
+    let settings = ground::Settings {
+        tick: 1.0 / TICKS,
+        threads: threads.clamp(1, 1024),
+        memory: MEMORY,
+        ..ground::Settings::default()
+    };
+    let made = Ground::new(description, settings);
+    made.map(Some).map_err(|error| Error::Ground { error, time: 0.0, metre, span: bed.span })
+}
+
+/// The largest difference of the heights of two states of a ground, in m.
+fn distance(one: &Ground, other: &Ground) -> f64 {
+    let mut most = 0.0_f64;
+    for extent in one.changed_since(other).into_iter().chain(other.changed_since(one)) {
+        for k in extent.z[0]..=extent.z[1] {
+            for i in extent.x[0]..=extent.x[1] {
+                most = most.max((one.column(i, k) - other.column(i, k)).abs());
+            }
+        }
+    }
+    most
 }
 
 /// The columns that a declaration describes, in SI.

@@ -27,7 +27,7 @@ pub struct Weather<'m> {
 /// The wind that a model declares, without bodies. Runs of one model share it.
 #[derive(Debug)]
 struct Declared {
-    field: Field,
+    field: Arc<Field>,
     recent: Recent,
     spans: Spans,
 }
@@ -99,7 +99,7 @@ impl Declared {
         description.ground = ground.map(|height| Ground::Flat(height * units.length));
         let spans = Spans { wind: span, flows: flows.iter().map(|flow| flow.span).collect() };
         match Field::new(description) {
-            Ok(field) => Ok(Arc::new(Declared { field, recent: Recent::default(), spans })),
+            Ok(field) => Ok(Arc::new(Declared { field: Arc::new(field), recent: Recent::default(), spans })),
             Err(error) => Err(spans.locate(error)),
         }
     }
@@ -160,6 +160,11 @@ impl<'m> Weather<'m> {
     /// The field without bodies.
     pub fn field(&self) -> &Field {
         &self.declared.field
+    }
+
+    /// The same, shared.
+    pub(crate) fn shared_field(&self) -> Arc<Field> {
+        Arc::clone(&self.declared.field)
     }
 
     /// The wind at an instant, in s, without bodies.

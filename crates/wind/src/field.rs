@@ -166,6 +166,25 @@ impl Field {
         Snapshot::new(time, lattices, mean, flows, Arc::clone(&self.setting))
     }
 
+    /// The turbulence alone at a time in seconds, relative to its amplitude: that of the wind is it times the intensity and |U|; Kolmogorov's has its own
+    /// amplitude. Below the ground it goes on smoothly, where there is no air. It costs what [`at`](Field::at) does.
+    ///
+    /// # Errors
+    ///
+    /// A time that is not finite; a speed that varies, more than 10⁷ s from 0.
+    pub fn turbulence(&self, time: f64) -> Result<Snapshot, Error> {
+        let (time, instant) = self.instant(time)?;
+        let mut work = Transform::new();
+        let bands = self.turbulence.bands.iter();
+        let lattices = bands.map(|band| Lattice::new(band, instant, self.lap, 1.0, &mut work)).collect();
+        Ok(Snapshot::of_turbulence(time, lattices, Arc::clone(&self.setting)))
+    }
+
+    /// The period in seconds after which the wind repeats, if it does.
+    pub fn period(&self) -> Option<f64> {
+        self.period
+    }
+
     /// The factor of the velocities of the bands at a mean speed.
     fn amplitude(&self, speed: f64) -> f64 {
         match self.turbulence.kind {

@@ -158,6 +158,35 @@ impl Lattice {
         self.spacing
     }
 
+    /// Bounds of the velocity (m/s) and of the potential (m²/s), or of how far they are from those of a lattice of the same band: splines lie between
+    /// their coefficients, and their derivatives between differences of these.
+    pub(crate) fn extremes(&self, before: Option<&Lattice>) -> [f64; 2] {
+        let at = |i: usize| {
+            let [x, y, z, _] = self.coefficients[i].0;
+            let here = Vector3::new(x, y, z);
+            before.map_or(here, |before| {
+                let [x, y, z, _] = before.coefficients[i].0;
+                here - Vector3::new(x, y, z)
+            })
+        };
+        let (mut largest, mut steps) = (0.0f64, [0.0f64; 3]);
+        for a in 0..N {
+            for b in 0..N {
+                for c in 0..N {
+                    let index = |a: usize, b: usize, c: usize| (a * N + b) * N + c;
+                    let here = at(index(a, b, c));
+                    largest = largest.max(here.norm_squared());
+                    let next = |i: usize| (i + 1) % N;
+                    let neighbours = [index(next(a), b, c), index(a, next(b), c), index(a, b, next(c))];
+                    for (step, neighbour) in steps.iter_mut().zip(neighbours) {
+                        *step = step.max((at(neighbour) - here).norm_squared());
+                    }
+                }
+            }
+        }
+        [steps.map(f64::sqrt).iter().sum(), largest.sqrt() * self.spacing]
+    }
+
     /// The curl at a point in m.
     #[inline]
     pub(crate) fn velocity(&self, x: Vector3<f64>) -> Vector3<f64> {

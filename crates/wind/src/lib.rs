@@ -14,7 +14,7 @@
 //!   before, and has the same bits on every thread and machine (as long as functions of the description do).
 //!
 //! [`Field::at`] sums over frequencies once for an instant (1.5 ms on one core); [`Snapshot::velocity`] then takes about half a
-//! microsecond for a place. [`Field::sum_of_modes`] is the reference.
+//! microsecond for a place. [`Field::sum_of_modes`] is the reference; [`Eddies`] is for equations that read the wind at any time.
 //!
 //! # Examples
 //!
@@ -50,6 +50,7 @@
 mod air;
 mod bodies;
 mod description;
+mod eddies;
 mod error;
 mod field;
 mod fourier;
@@ -69,6 +70,7 @@ mod turns;
 
 pub use air::{Still, Wind};
 pub use description::{Description, Signal};
+pub use eddies::{Bounds, Eddies, EddyBounds, EddyJet};
 pub use error::Error;
 pub use field::Field;
 pub use hull::Hull;

@@ -10,14 +10,17 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::Signal;
 
-/// The ramp α at a share of the layer from 0 to 1, its first and its second derivative: (15r - 10r³ + 3r⁵)/8, and 1 beyond.
+/// The ramp α at a share of the layer from 0 to 1, its first and its second derivative: (15r - 10r³ + 3r⁵)/8, and 1 beyond. It is odd.
 pub(crate) fn ramp(r: f64) -> [f64; 3] {
-    if r >= 1.0 {
-        return [1.0, 0.0, 0.0];
+    if r.abs() >= 1.0 {
+        return [r.signum(), 0.0, 0.0];
     }
     let s = r * r;
     [r * (15.0 - s * (10.0 - 3.0 * s)) / 8.0, 15.0 * (1.0 - s) * (1.0 - s) / 8.0, -7.5 * r * (1.0 - s)]
 }
+
+/// The largest magnitudes of the first three derivatives of the ramp.
+pub(crate) const RAMP_SLOPES: [f64; 3] = [1.875, 2.887, 15.0];
 
 /// A body in the wind. All of its functions must be pure: equal arguments give equal values. Lengths are in metres, times in seconds.
 ///

@@ -10,10 +10,11 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::bodies::Body;
 use crate::description::positive;
+use crate::eddies::Extremes;
 use crate::error::Error;
 use crate::field::Setting;
 use crate::lattice::{Jet, Lattice, curl, curl_gradient};
-use crate::obstacle::{Level, Obstacle, ramp};
+use crate::obstacle::{Level, Obstacle, RAMP_SLOPES, ramp};
 use crate::primitives::Primitive;
 
 /// The wind at an instant. It is a value of its own: it can be kept, cloned and shared between threads.
@@ -27,6 +28,8 @@ pub struct Snapshot {
     flows: Vec<Primitive>,
     bodies: Vec<Body>,
     setting: Arc<Setting>,
+    /// It goes on below the ground.
+    is_continued: bool,
 }
 
 /// The mean wind at an instant.
@@ -88,9 +91,17 @@ impl Snapshot {
         flows: Vec<Primitive>,
         setting: Arc<Setting>,
     ) -> Result<Snapshot, Error> {
-        let snapshot = Snapshot { time, lattices: lattices.into(), mean, flows, bodies: Vec::new(), setting };
+        let (lattices, bodies) = (lattices.into(), Vec::new());
+        let snapshot = Snapshot { time, lattices, mean, flows, bodies, setting, is_continued: false };
         let setting = Arc::clone(&snapshot.setting);
         snapshot.among(&setting.obstacles)
+    }
+
+    /// Lattices without a mean wind, flows and bodies, which go on below the ground.
+    pub(crate) fn of_turbulence(time: f64, lattices: Vec<Lattice>, setting: Arc<Setting>) -> Snapshot {
+        let mean = Mean::new(Vector3::zeros(), None);
+        let (lattices, flows, bodies) = (lattices.into(), Vec::new(), Vec::new());
+        Snapshot { time, lattices, mean, flows, bodies, setting, is_continued: true }
     }
 
     /// The same wind with further bodies in it, as they are at this instant. The wind at the centre of each is that without any body.
@@ -133,6 +144,36 @@ impl Snapshot {
         }
     }
 
+    fn ends_at_ground(&self) -> bool {
+        self.setting.ground.is_some() && !self.is_continued
+    }
+
+    /// Bounds of the turbulence, or of how far it is from that at another instant, over flat ground or without any.
+    ///
+    /// A difference of differences is at most twice as large as those, so that each derivative of a spline is at most twice the one before over the
+    /// spacing, along an axis of the lattice, and √3 times that along any direction.
+    pub(crate) fn extremes(&self, before: Option<&Snapshot>) -> Extremes {
+        let mut sum = [0.0; 3];
+        for (i, (lattice, layer)) in self.lattices.iter().zip(self.setting.layers).enumerate() {
+            let [speed, potential] = lattice.extremes(before.and_then(|before| before.lattices.get(i)));
+            let finer = 2.0 * f64::sqrt(3.0) / lattice.spacing();
+            let [slope, bend] = [speed * finer, speed * finer * finer];
+            let mut of = [speed, slope, bend];
+            if self.setting.ground.is_some() {
+                // Derivatives of a product with the ramp.
+                let [a, b, c] = RAMP_SLOPES;
+                let [a, b, c] = [a / layer, b / (layer * layer), c / (layer * layer * layer)];
+                of[0] += a * potential;
+                of[1] += 2.0 * a * speed + b * potential;
+                of[2] += 3.0 * a * slope + 3.0 * b * speed + c * potential;
+            }
+            for (sum, of) in sum.iter_mut().zip(of) {
+                *sum += of;
+            }
+        }
+        Extremes(sum)
+    }
+
     /// α and its derivative at a height in a layer; 1 where there is no ground.
     fn ground_ramp(&self, height: f64, layer: f64) -> [f64; 3] {
         if self.setting.ground.is_none() || height >= layer {
@@ -164,7 +205,7 @@ impl Snapshot {
     /// The velocity without bodies.
     pub(crate) fn stream(&self, x: Vector3<f64>) -> Stream {
         let level = self.level(x);
-        if self.setting.ground.is_some() && level.eta < 0.0 {
+        if level.eta < 0.0 && self.ends_at_ground() {
             return Stream { velocity: Vector3::zeros(), rest: Vector3::zeros() };
         }
         let flat = Vector3::new(x.x, level.eta, x.z);
@@ -252,7 +293,7 @@ impl Snapshot {
     /// The derivatives of the velocity over flat ground or without any.
     fn free_gradient(&self, x: Vector3<f64>) -> Matrix3<f64> {
         let height = self.level(x).eta;
-        if self.setting.ground.is_some() && height < 0.0 {
+        if height < 0.0 && self.ends_at_ground() {
             return Matrix3::zeros();
         }
         let flat = Vector3::new(x.x, height, x.z);

@@ -27,16 +27,24 @@ pub fn part(model: &Model) -> Option<ScenePart> {
         1 => reasons.push("`pour` adds to it".to_owned()),
         count => reasons.push(format!("`pour` adds to it in {count} places")),
     }
+    let has_bodies = !solids.is_empty() || !shelves.is_empty();
+    let read = match model.reads_ground() {
+        true if has_bodies => {
+            "; rules read its height, so that growth and ground go through each tick until they agree"
+        }
+        true => "; rules read its height",
+        false => "",
+    };
     if reasons.is_empty() {
         let why = format!(
-            "{columns}; nothing touches it, so it moves only where it is steeper than it can stand at t = 0, until it rests"
+            "{columns}; nothing touches it, so it moves only where it is steeper than it can stand at t = 0, until it rests{read}"
         );
         return Some(ScenePart::new(name, "nothing to do", why));
     }
     let t = model.frames.map_or(0.0, |frames| frames.to);
     let ticks = brief((t * scenery.units.time * GROUND_TICKS).ceil(), 9);
     let why = format!(
-        "{columns}; {}: {ticks} ticks of 1/{GROUND_TICKS} s up to t = {}, with memory and work for columns that are touched or slip",
+        "{columns}; {}: {ticks} ticks of 1/{GROUND_TICKS} s up to t = {}, with memory and work for columns that are touched or slip{read}",
         reasons.join("; "),
         brief(t, 6)
     );

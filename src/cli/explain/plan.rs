@@ -337,13 +337,21 @@ impl Facts<'_> {
             .map(|parameter| {
                 let name = self.name(compiled, parameter).unwrap_or_default();
                 if let Some(quantity) = input(parameter) {
-                    let why = match quantity.is_force() {
-                        true => {
-                            "follows from what sheets do to the solid, at the ticks of their grid of time"
-                        }
-                        false => "follows from the bending of the stem, at the ticks of its grid of time",
+                    let (why, law) = match quantity {
+                        Quantity::Force(_) => (
+                            "follows from what sheets do to the solid, at the ticks of their grid of time",
+                            "linear from tick to tick",
+                        ),
+                        Quantity::Strain => (
+                            "follows from the bending of the stem, at the ticks of its grid of time",
+                            "linear from tick to tick",
+                        ),
+                        Quantity::Ground => (
+                            "stands for the heights of the soil, which are others after each tick at which it moves",
+                            "constant from tick to tick",
+                        ),
                     };
-                    let law = Some("linear from tick to tick".to_owned());
+                    let law = Some(law.to_owned());
                     return ParameterPlan {
                         name,
                         class: "given",

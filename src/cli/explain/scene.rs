@@ -117,6 +117,17 @@ fn physics(scenery: &Scenery, parts: &mut Vec<ScenePart>) {
         self::wind(wind, scenery.units, parts);
     }
     parts.extend(scenery.flows.iter().map(flow));
+    if scenery.flow_reader.is_some() {
+        let why = match scenery.eddies.is_some() {
+            true => {
+                "rules or drawings read the wind: mean wind and flows as expressions, turbulence with cubics between 128 instants a second; bodies do not change it"
+            }
+            false => {
+                "rules or drawings read the wind, as expressions of time and place; bodies do not change it"
+            }
+        };
+        parts.push(ScenePart::new("flow_x, flow_y, flow_z", FORMULA, why.to_owned()));
+    }
     parts.extend(scenery.tissues.iter().zip(1..).map(|(tissue, number)| self::tissue(tissue, number)));
 }
 

@@ -235,6 +235,9 @@ pub fn forms(
                 Some(index) => Form::number(Bounded::written(graph.array_of(array).element(index.value))),
                 None => all.of(format!("element{array:?}{:?}", known[&index])),
             },
+            Node::Field(field, part, at) => {
+                all.of(format!("field{field:?}{part:?}{:?}", at.map(|of| &known[&of])))
+            }
         };
         known.insert(id, form);
     }

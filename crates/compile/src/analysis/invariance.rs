@@ -35,6 +35,10 @@ pub fn never_reached(
 ) -> bool {
     let known = |v: u32| (v as usize) < own || (v as usize) >= own + context;
     let read = graph.variables(&[a, b]);
+    // Fields have no second derivatives.
+    if graph.reads_field(&[a, b]) {
+        return false;
+    }
     if !read.iter().all(|v| known(*v)) {
         return false;
     }

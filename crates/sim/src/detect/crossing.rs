@@ -87,6 +87,10 @@ impl Function for Difference<'_, '_> {
         self.sides.eval(&m.values, &mut m.scratch, &mut m.out);
         m.out[2 * self.atom] - m.out[2 * self.atom + 1]
     }
+
+    fn stretch(&self) -> f64 {
+        self.path.world.stretch / self.path.h
+    }
 }
 
 /// True if the crossings of some atom of a module can only be found by search, so that the stretch to search must be

@@ -96,6 +96,10 @@ impl<F: Function> Function for Raised<'_, F> {
     fn value(&mut self, at: f64) -> f64 {
         self.0.value(at) + self.1
     }
+
+    fn stretch(&self) -> f64 {
+        self.0.stretch()
+    }
 }
 
 impl CrossingDetector {

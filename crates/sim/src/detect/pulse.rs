@@ -10,6 +10,9 @@
 //! step does not resolve. An integrated variable is resolved by the step to the tolerance, and a polynomial of it has
 //! no pulses.
 //!
+//! Fields ([`dlsys_expr::Field`]) are held at the middle of a piece, too: they do not vary on less than the time that they give, and steps of equations that read
+//! them are no longer than some of that ([`World::resolved`]).
+//!
 //! In stiff equations bounds over a range of states carry no information: the rates of two states a tolerance apart may
 //! differ by any amount. There the states are held at the middle of a piece, and only time and closed forms vary. Steps
 //! whose rates cannot be bounded are counted; `run --stats` and `explain` report their rules.
@@ -19,7 +22,7 @@ use smallvec::SmallVec;
 use crate::world::World;
 use crate::world::path::Path;
 use crate::world::state::State;
-use dlsys_expr::{Interval, Program, Scratch};
+use dlsys_expr::{Held, Interval, Program, Scratch};
 use dlsys_model::{Rule, Solve};
 use dlsys_ode::Dense;
 use dlsys_tree::SimTime;
@@ -78,6 +81,9 @@ pub struct PulseDetector {
     bounds_out: Vec<Interval>,
     scratch: Scratch<f64>,
     bounds_scratch: Scratch<Interval>,
+    held: Vec<Held>,
+    held_out: Vec<Held>,
+    held_scratch: Scratch<Held>,
 }
 
 impl PulseDetector {
@@ -153,7 +159,15 @@ impl PulseDetector {
         while let Some((lo, hi)) = stack.pop() {
             pieces += 1;
             path.everything_over(lo, hi, step.stiff, &mut self.bounds);
-            program.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
+            if path.world.stretch.is_finite() {
+                self.held.clear();
+                self.held.extend(self.bounds.iter().copied().map(Held));
+                self.held_out.resize(program.outputs(), Held(Interval::EMPTY));
+                program.eval(&self.held, &mut self.held_scratch, &mut self.held_out);
+                self.bounds_out.iter_mut().zip(&self.held_out).for_each(|(out, held)| *out = held.0);
+            } else {
+                program.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
+            }
             let (mut surprising, mut bounded) = (false, true);
             for (bounds, seen) in self.bounds_out.iter().zip(&self.seen) {
                 let size = bounds.magnitude();

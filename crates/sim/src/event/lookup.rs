@@ -27,6 +27,9 @@ impl EventStage<'_, '_> {
             if !self.world.tree.is_alive(id) {
                 continue;
             }
+            if self.setup.reads_ground {
+                self.world.put_on_ground(model, id);
+            }
             let kind = self.world.tree.kind(id);
             if self.events.steps.has_rules[kind.index()] {
                 self.events.steps.join(id);

@@ -242,7 +242,8 @@ impl FlowStage<'_, '_> {
         let mut tries = 0;
         let step = loop {
             let stats = &mut self.log.stats;
-            let request = StepRequest { settings: &settings, y: &y, start: from, limit: None };
+            let limit = self.world.resolved(from).filter(|_| solve.rates.stretch().is_finite());
+            let request = StepRequest { settings: &settings, y: &y, start: from, limit };
             let step = integrator.step(request, control, &mut system, stats);
             let step = step.map(|_| integrator.dense(&mut system, &y));
             let Ok(dense) = &step else { break step };

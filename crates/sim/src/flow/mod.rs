@@ -44,6 +44,8 @@ pub use integrator::next_grid_time;
 const ARRIVED: f64 = 0.01;
 /// Growth of the stretches that are searched on closed forms.
 const WIDENING: f64 = 4.0;
+/// Most of the stretches within which fields change that are searched at once.
+const CHANGES: f64 = 1024.0;
 
 /// The data that flows keep from step to step.
 #[derive(Clone)]
@@ -187,7 +189,7 @@ impl FlowStage<'_, '_> {
     pub fn look_ahead(&mut self, id: ModuleId, from: SimTime) -> Result<(), Error> {
         let model = self.setup.model;
         let who = Owner::Module(id.slot() as u32);
-        let World { tree, states, .. } = &mut self.world;
+        let World { tree, states, stretch, .. } = &mut *self.world;
         let state = states[id.slot()].as_mut().expect("a module with a rule");
         let rule = &model.rules[state.rule.expect("a module with a rule")];
         // The steps of coupled modules are not their own.
@@ -205,7 +207,7 @@ impl FlowStage<'_, '_> {
                 closed_form::time_scale(state, tree)
             };
             // Not shorter than time itself can tell.
-            let h = h.max(64.0 * from.resolution());
+            let h = h.min(CHANGES * *stretch).max(64.0 * from.resolution());
             state.window = h;
             (h, 1.0)
         } else {

@@ -4,7 +4,9 @@
 //! [`Terms::solve`] integrates the result. A solution that would be inaccurate in this form (too many terms, or near
 //! resonance) is refused; then the module is integrated numerically.
 
-use dlsys_expr::{Array, Binary, Curve, Dual, Interval, Part, Unary, Value};
+use dlsys_expr::{
+    Array, Binary, Curve, Dual, FIELD_ARGUMENTS, FieldPart, FieldSlot, Interval, Part, Unary, Value,
+};
 
 /// The term Re (re + i im) τ^power exp((growth + i frequency) τ).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -293,6 +295,10 @@ impl Value for Terms {
 
     fn element(array: &Array, index: Terms) -> Terms {
         index.as_constant().map_or(Terms::REFUSED, |index| Terms::constant(array.element(index)))
+    }
+
+    fn field(_: &FieldSlot, _: FieldPart, _: [Terms; FIELD_ARGUMENTS]) -> Terms {
+        Terms::REFUSED
     }
 }
 

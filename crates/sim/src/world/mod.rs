@@ -46,6 +46,10 @@ pub struct World {
     pub coupled: Option<CoupledSolution>,
     /// Number of changes of the structure.
     pub structure: u64,
+    /// The number of the heights of the ground that hold now, for modules that read them.
+    pub ground: f64,
+    /// The time within which a field changes much that some rule reads; infinite if none does.
+    pub stretch: f64,
 }
 
 impl World {
@@ -59,7 +63,16 @@ impl World {
             lives: Lives::new(model, kinds_with_context),
             coupled: None,
             structure: 0,
+            ground: 0.0,
+            stretch: model.stretch(),
         }
+    }
+
+    /// The instant up to which a step of equations that read fields may go; `None` if no rule reads one.
+    pub fn resolved(&self, from: SimTime) -> Option<SimTime> {
+        /// In parts of the time within which a field changes much.
+        const STEP: f64 = 8.0;
+        self.stretch.is_finite().then(|| from.after(STEP * self.stretch))
     }
 
     /// The state of a living module that has one.

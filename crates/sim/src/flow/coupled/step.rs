@@ -190,7 +190,7 @@ impl FlowStage<'_, '_> {
     fn make_step(&mut self, from: SimTime) -> CommonStep {
         let rules = &self.setup.model.rules;
         let longest = self.flows.coupled.traffic.begin(from, self.flows.coupled.members.len());
-        let limits = [self.setup.settings.slice_end(from), longest];
+        let limits = [self.setup.settings.slice_end(from), longest, self.world.resolved(from)];
         let limit = limits.into_iter().flatten().reduce(|a, b| if b < a { b } else { a });
         let settings = &self.setup.coupled_settings;
         let (mut solution, mut tries) = (None, 0);
