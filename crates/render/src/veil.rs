@@ -180,7 +180,7 @@ mod tests {
             let x = 4.0 * draw(n, 0) - 2.0;
             let size = if x < 0.0 { 0.3 } else { 0.03 + 0.1 * draw(n, 1) };
             let centre = Point::new(x, 3.0 * draw(n, 2), 1.4 * draw(n, 3) - 0.7);
-            Blob { centre, deviation: size * (0.8 + 0.4 * draw(n, 4)), mass: size, key: n as u64 }
+            Blob { centre, deviation: size * (0.8 + 0.4 * draw(n, 4)), mass: size, key: n }
         });
         let gas = Gas {
             name: Arc::from("smoke"),

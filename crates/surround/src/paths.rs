@@ -165,12 +165,11 @@ impl Watch {
             self.first.iter().enumerate().map(|(i, solid)| (solid.origin.lineage.id, i)).collect();
         for solid in drawn {
             let first = descent.line(solid.origin.lineage.id).find_map(|id| known.get(&id));
-            if let Some(&first) = first.filter(|first| self.first[**first].balls.len() == solid.balls.len()) {
-                if !self.is_put_elsewhere(first, &solid) {
-                    let points = solid.balls.iter().map(|(point, _)| *point).collect();
-                    self.later[first][instant - 1].get_or_insert(points);
-                    self.modules[first] = solid.origin.lineage.id;
-                }
+            let first = first.filter(|first| self.first[**first].balls.len() == solid.balls.len());
+            if let Some(&first) = first.filter(|first| !self.is_put_elsewhere(**first, &solid)) {
+                let points = solid.balls.iter().map(|(point, _)| *point).collect();
+                self.later[first][instant - 1].get_or_insert(points);
+                self.modules[first] = solid.origin.lineage.id;
             }
         }
         Ok(())
