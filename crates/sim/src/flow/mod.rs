@@ -44,8 +44,8 @@ pub use integrator::next_grid_time;
 const ARRIVED: f64 = 0.01;
 /// Growth of the stretches that are searched on closed forms.
 const WIDENING: f64 = 4.0;
-/// Most of the stretches within which fields change that are searched at once.
-const CHANGES: f64 = 1024.0;
+/// Most of the stretches within which fields change that are searched at once. Modules that go on together read the same instants of a field, of which few are kept.
+const CHANGES: f64 = 16.0;
 
 /// The data that flows keep from step to step.
 #[derive(Clone)]
