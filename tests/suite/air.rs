@@ -7,7 +7,7 @@ use dlsys::surround::{Place, Weather, start};
 use dlsys::tree::ModuleString;
 use nalgebra::Vector3;
 
-use crate::common::session;
+use crate::common::{bits, session};
 
 fn model(text: &str) -> Model {
     session(text).model
@@ -149,9 +149,6 @@ fn frames_and_copies_change_no_bit() {
         "{GUSTS}initial string: S(0, 1) S(0, 2)\nS(x, y): if x < 2 solve dx/dt = 0.3*flow_x(x, y, 0), dy/dt = flow_y(x, y, 0)\n  \
          if x = 2 produce S(0, y) S(1, y)"
     ));
-    let bits = |string: &ModuleString| -> Vec<u64> {
-        string.iter().flat_map(|module| module.parameters.iter().map(|x| x.to_bits())).collect()
-    };
     let once = bits(&at(&mut started(&model), 3.0));
     let mut often = started(&model);
     for frame in 0..30 {

@@ -118,3 +118,8 @@ pub fn show(string: &[Plain]) -> String {
     });
     modules.collect::<Vec<_>>().join(" ")
 }
+
+/// The parameters of all modules of a string, to the last bit.
+pub fn bits(string: &dlsys::tree::ModuleString) -> Vec<u64> {
+    string.iter().flat_map(|module| module.parameters.iter().map(|x| x.to_bits())).collect()
+}

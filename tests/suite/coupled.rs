@@ -10,7 +10,7 @@ use dlsys::surround::{Trial, TrialTick, Ways};
 use serde_json::Value;
 
 use crate::common::repository;
-use crate::sheets::{cloth, with_mesh};
+use crate::sheets::{cloth, cloth_of, with_mesh};
 
 fn report(arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_dlsys"));
@@ -251,17 +251,7 @@ Ball(x, y, z, u, v, w):
 #[test]
 fn trials_are_in_si() {
     let metres = ticks(&session(&format!("{CLOTH}{DRAWN}{FALLS}"), &cloth()), 0.5, true);
-    let mesh: String = cloth()
-        .lines()
-        .map(|line| match line.strip_prefix("v ") {
-            Some(point) => {
-                let point: Vec<f64> =
-                    point.split(' ').map(|x| x.parse::<f64>().expect("a number") * 10.0).collect();
-                format!("v {} {} {}\n", point[0], point[1], point[2])
-            }
-            None => format!("{line}\n"),
-        })
-        .collect();
+    let mesh = cloth_of(10.0);
     let text = format!("units length 0.1, time 0.5\n{CLOTH}{DRAWN}{FALLS}")
         .replace("0.01 | x > 0.99", "0.1 | x > 9.9")
         .replace("f(0.5)", "f(5)")

@@ -10,7 +10,7 @@ use dlsys::sim::{BendSettings, Settings};
 use dlsys::tree::ModuleString;
 
 use crate::common::repository;
-use crate::sheets::{cloth, with_mesh};
+use crate::sheets::{cloth, cloth_of, with_mesh};
 
 /// A cloth of 1 by 1 m and 0.2 kg, held along two sides.
 const CLOTH: &str = "tissue silk = stiffness 1e6, density 200, damping 0.1, thickness 0.001
@@ -212,17 +212,7 @@ Later(y, v): solve dy/dt = v, dv/dt = -9.81 + force_y/0.5\n";
 #[test]
 fn units_are_those_of_the_model() {
     let metres = values(&session(&format!("{CLOTH}{DRAWN}{BALL}")), Settings::default(), &[0.2, 0.3, 0.5]);
-    let mesh: String = cloth()
-        .lines()
-        .map(|line| match line.strip_prefix("v ") {
-            Some(point) => {
-                let point: Vec<f64> =
-                    point.split(' ').map(|x| x.parse::<f64>().expect("a number") * 10.0).collect();
-                format!("v {} {} {}\n", point[0], point[1], point[2])
-            }
-            None => format!("{line}\n"),
-        })
-        .collect();
+    let mesh = cloth_of(10.0);
     let text = format!("units length 0.1, time 0.5\n{CLOTH}{DRAWN}{BALL}")
         .replace("0.01 | x > 0.99", "0.1 | x > 9.9")
         .replace("f(0.5)", "f(5)")

@@ -5,7 +5,7 @@ use dlsys::sim::{Settings, Simulation};
 use dlsys::surround::Terrain;
 use dlsys::tree::ModuleString;
 
-use crate::common::session;
+use crate::common::{bits, session};
 
 fn at(simulation: &mut Simulation, t: f64) -> ModuleString {
     let mut string = ModuleString::default();
@@ -156,9 +156,6 @@ fn both_ways_has_the_same_bits_in_any_order() {
     let session = session(&format!(
         "{PRESSED}Ball(y): solve dy/dt = -0.4*exp(-20*ground(0.18, 0))\nProbe(d): solve d = ground(0.18, 0)"
     ));
-    let bits = |string: &ModuleString| -> Vec<u64> {
-        string.iter().flat_map(|module| module.parameters.iter().map(|x| x.to_bits())).collect()
-    };
     let once = bits(&at(&mut started(&session), 0.6));
     let mut often = started(&session);
     for frame in 0..23 {

@@ -12,9 +12,20 @@ use crate::glb::{self, follow, random_times};
 
 /// A cloth of 4 by 4 squares, 1 by 1 in the plane y = 0.
 pub fn cloth() -> String {
+    cloth_of(1.0)
+}
+
+/// The same of another size.
+pub fn cloth_of(size: f64) -> String {
+    sheet_of(|x, z| [x * size, 0.0, z * size])
+}
+
+/// A sheet of 4 by 4 squares that lead from 0 to 1 along two directions.
+fn sheet_of(place: impl Fn(f64, f64) -> [f64; 3]) -> String {
     let mut text = String::new();
     for k in 0..25 {
-        text += &format!("v {} 0 {}\n", (k % 5) as f64 / 4.0, (k / 5) as f64 / 4.0);
+        let [x, y, z] = place((k % 5) as f64 / 4.0, (k / 5) as f64 / 4.0);
+        text += &format!("v {x} {y} {z}\n");
     }
     for k in 0..16 {
         let a = k / 4 * 5 + k % 4 + 1;
@@ -323,14 +334,7 @@ fn a_copy_of_a_module_has_a_sheet_of_its_own() {
 /// A flag in still air hangs down: the plane in which it begins is no rest.
 #[test]
 fn a_flag_in_still_air_hangs_down() {
-    let mut text = String::new();
-    for k in 0..25 {
-        text += &format!("v {} {} 0\n", (k % 5) as f64 / 4.0, (k / 5) as f64 / 8.0);
-    }
-    for k in 0..16 {
-        let a = k / 4 * 5 + k % 4 + 1;
-        text += &format!("f {} {} {} {}\n", a, a + 1, a + 6, a + 5);
-    }
+    let text = sheet_of(|x, y| [x, y / 2.0, 0.0]);
     let model = "tissue silk = stiffness 1e6, density 500, damping 0.2, thickness 0.0002\n\
                  sheet @Cloth from \"cloth.obj\" of silk pinned x < 0.01\ninitial string: f(2) @Cloth\n";
     let session = with_mesh(model, &text).unwrap_or_else(|error| panic!("{error}"));
