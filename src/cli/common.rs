@@ -316,7 +316,7 @@ impl ModelRun {
         if let Some(span) = turtle::place_of_source(model).filter(|_| turtle::lets_out(model)) {
             let warning = Diagnostic::warning(format!("{what} does not hold gases"))
                 .at(span, "what begins here is not seen in it")
-                .help("PNG pictures and films show gases: `dlsys render MODEL --format png`; OBJ and USDA files have blobs as points");
+                .help("PNG pictures and films show gases: `dlsys render MODEL --format png`; OBJ, GLB and USDA files have blobs as points");
             self.note(vec![warning]);
             self.remarks.lock().unwrap_or_else(PoisonError::into_inner).lacks_gases = true;
         }

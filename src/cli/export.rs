@@ -177,9 +177,6 @@ fn write(order: &Order<'_>, run: ModelRun, stale: &dyn Fn() -> bool) -> Result<(
     if !run.session.model.scenery.plants.is_empty() {
         return Err(failure(&run, &Error::Plants));
     }
-    if order.format == interchange::Format::Glb {
-        run.note_missing_gases("a GLB file");
-    }
     let mut clock = run.clock;
     let (survey, stats) = measure(order, &run, &mut clock)?;
     if stale() {
@@ -318,7 +315,7 @@ fn options(order: &Order<'_>, run: &ModelRun, survey: &Survey, fit: &Fit) -> Opt
     let extent = fit.accuracy / Fit::ACCURACY;
     let mut options = Options::new(&run.session.model, fit.default_width, extent);
     options.threads = order.threads;
-    options.gases = order.format == interchange::Format::Usda;
+    options.gases = true;
     if let Some(accuracy) = order.accuracy {
         options.accuracy = fit.clone().with_accuracy(accuracy).accuracy / extent;
     }

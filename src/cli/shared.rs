@@ -6,10 +6,12 @@ use clap::{Args, ValueEnum};
 
 use super::args::IncludeArgs;
 use super::common::Failure;
-use super::values::{bend_method, bend_tolerance, bytes, events, method, positive, setting, time, tolerance};
+use super::values::{
+    bend_method, bend_tolerance, bytes, events, ground_rule, method, positive, setting, time, tolerance,
+};
 use crate::compile::Setting;
 use crate::interchange::Format;
-use crate::sim::{BendMethod, BendSettings, Method, Settings};
+use crate::sim::{BendMethod, BendSettings, GroundRule, Method, Settings};
 use crate::study::method_name;
 
 /// Limits of a run, so that a run that would not end stops with a message.
@@ -66,6 +68,9 @@ pub struct SolverArgs {
     /// Method of integration of stems that bend: ros2, ros34pw2 (faster below tolerances of about 1e-5), euler (for comparison)
     #[arg(long, value_name = "METHOD", default_value = "ros2", value_parser = bend_method)]
     pub bend_method: BendMethod,
+    /// What moves soil that is too steep: law, or for comparison the rules of the papers: sumner, sandbox, li
+    #[arg(long, value_name = "RULE", default_value = "law", value_parser = ground_rule)]
+    pub ground_rule: GroundRule,
 }
 
 impl SolverArgs {
@@ -92,6 +97,7 @@ impl SolverArgs {
             step_size: self.step_size.unwrap_or(settings.step_size),
             seed: self.seed,
             bending: BendSettings { method: self.bend_method, tolerance: self.bend_tolerance },
+            ground_rule: self.ground_rule,
             ..settings
         })
     }

@@ -7,7 +7,7 @@ use crate::film;
 use crate::interchange;
 use crate::render::{Camera, Format, Layout, Page};
 use crate::scene::{Color, Point, Vector, Viewpoint};
-use crate::sim::{BendMethod, Method, brief};
+use crate::sim::{BendMethod, GroundRule, Method, brief};
 use crate::study::Thresholds;
 
 /// A format for frames.
@@ -341,6 +341,14 @@ pub(super) fn bend_method(text: &str) -> Result<BendMethod, String> {
     found.map(|(_, method)| *method).ok_or_else(|| {
         let names: Vec<&str> = BendMethod::NAMED.iter().map(|(name, _)| *name).collect();
         format!("methods of bending are {}", names.join(", "))
+    })
+}
+
+pub(super) fn ground_rule(text: &str) -> Result<GroundRule, String> {
+    let found = GroundRule::NAMED.iter().find(|(name, _)| *name == text);
+    found.map(|(_, rule)| *rule).ok_or_else(|| {
+        let names: Vec<&str> = GroundRule::NAMED.iter().map(|(name, _)| *name).collect();
+        format!("rules of soil are {}", names.join(", "))
     })
 }
 

@@ -8,6 +8,8 @@ use dlsys::session::{Nursery, Session};
 use dlsys::sim::Settings;
 use dlsys::tree::ModuleString;
 
+use crate::glb_reader::Glb;
+
 /// A gas that changes little in some seconds.
 const GAS: &str = "gas smoke = size 0.05, mass 1e-3, extinction 20, diffusion 1e-3\n";
 
@@ -280,6 +282,28 @@ fn usd_files_hold_blobs_as_points() {
     let expected =
         scenes(&session, &times, 1).iter().map(|scene| scene.gases[0].blobs.len()).collect::<Vec<_>>();
     assert_eq!(counts, expected);
+}
+
+/// GLB files hold gases as points, too: at each frame all blobs of it, and nothing of another.
+#[test]
+fn glb_files_hold_blobs_as_points() {
+    let session = session(&format!("{GAS}initial string: F(1) @S(smoke, 100, 0.1)"));
+    let mut options = Options::new(&session.model, 0.01, 1.0);
+    options.gases = true;
+    let times = [0.0, 0.5, 1.0, 1.5];
+    let growth = grow(&session, Settings::default(), &times, &options, &mut |_| true).expect("a run");
+    let glb = Glb::read(&growth.file(dlsys::interchange::Format::Glb).expect("a file"));
+    assert_eq!(glb.duration(), 1.5);
+    for (time, scene) in times.iter().zip(scenes(&session, &times, 1)) {
+        // What is seen at a frame is seen until the next.
+        for later in [0.0, 0.3] {
+            let shown = glb.shown(time + later);
+            let points = shown.get("gas.smoke").map_or(&[][..], |shown| &shown.vertices);
+            let blobs = &scene.gases[0].blobs;
+            assert_eq!(points.len(), blobs.len(), "{time}");
+            assert!(points.iter().zip(blobs).all(|(point, blob)| (point - blob.centre).norm() < 1e-5));
+        }
+    }
 }
 
 #[test]

@@ -149,7 +149,9 @@ impl Glb {
                 let first = all.vertices.len();
                 let point = |p: &[f64]| Point::from(turn * (Vector::from_column_slice(p) * scale) + at);
                 all.vertices.extend(places.chunks_exact(3).map(point));
-                let corners = self.accessor(&primitive["indices"]);
+                // Points have no corners.
+                let is_points = primitive["mode"] == 0;
+                let corners = if is_points { Vec::new() } else { self.accessor(&primitive["indices"]) };
                 all.triangles
                     .extend(corners.as_chunks().0.iter().map(|t| t.map(|i: f64| i as usize + first)));
             }

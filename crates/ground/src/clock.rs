@@ -43,7 +43,7 @@ impl Ground {
                     self.move_body(body, (part + 1) as f64 / f64::from(*count))?;
                 }
             }
-            self.step(&law)?;
+            self.slip(&law)?;
         }
         self.fail_banks()?;
         self.book.ticks += 1;

@@ -9,10 +9,11 @@ use crate::graph::Graph;
 use crate::kernel::Law;
 use crate::load::Floors;
 use crate::material::REST;
+use crate::rules::Speeds;
 use crate::setup::Setup;
 use crate::tile::{COLUMN_BYTES, Extent, Key, QUANTA, Tile};
 use crate::wedge::note;
-use crate::{Error, Relief, Soil};
+use crate::{Error, Relief, Rule, Soil};
 
 /// What a ground is before anything touches it.
 #[derive(Clone, Debug)]
@@ -40,12 +41,14 @@ pub struct Settings {
     pub threads: usize,
     /// Memory for columns that have been touched, in MB; more is an error.
     pub memory: usize,
+    /// What moves material that is too steep.
+    pub rule: Rule,
 }
 
 impl Default for Settings {
-    /// Ticks of 1/120 s, tiles of 32, one thread, 1024 MB.
+    /// Ticks of 1/120 s, tiles of 32, one thread, 1024 MB, the law of this crate.
     fn default() -> Settings {
-        Settings { tick: 1.0 / 120.0, side: 32, threads: 1, memory: 1024 }
+        Settings { tick: 1.0 / 120.0, side: 32, threads: 1, memory: 1024, rule: Rule::Law }
     }
 }
 
@@ -78,6 +81,8 @@ pub struct Ground {
     pub(crate) stirred: bool,
     /// Whether something is poured in this tick, which bodies far above the ground may catch.
     pub(crate) poured_on: bool,
+    /// Speeds of slices, where the rule has any.
+    pub(crate) speeds: Speeds,
     pub(crate) book: Book,
 }
 
@@ -97,6 +102,8 @@ pub(crate) struct Book {
     pub owed: f64,
     /// Quanta that pours owe, by their number.
     pub debts: BTreeMap<u64, f64>,
+    /// Largest slope down which a rule of the papers moved something in the last sweep.
+    pub steepest: f64,
 }
 
 impl Ground {
@@ -110,23 +117,23 @@ impl Ground {
         check("a size of columns (m)", *cell, (1e-6..=1e4).contains(cell), "1e-6 to 10,000")?;
         extent.check()?;
         soil.check()?;
-        let Settings { tick, side, threads, memory } = settings;
+        let Settings { tick, side, threads, memory, rule } = settings;
         check("a tick (s)", tick, (1e-6..=10.0).contains(&tick), "1e-6 to 10")?;
         check("a side of tiles", side as f64, side == 16 || side == 32, "16 or 32")?;
         check("a number of threads", threads as f64, (1..=1024).contains(&threads), "1 to 1024")?;
         check("a memory (MB)", memory as f64, (1..=1 << 24).contains(&memory), "1 to 2^24")?;
         // λδt/4Δ² of a whole tick.
         let whole = soil.flow * tick / (4.0 * cell * cell);
-        let sweeps = (whole / TAU).ceil().max(1.0);
+        let sweeps = rule.sweeps(tick, *cell, (whole / TAU).ceil().max(1.0));
         check("a number of sweeps in a tick (flow · tick / cell²)", sweeps, sweeps <= SWEEPS, "at most 1e5")?;
         let law = Law {
-            tau: whole / sweeps,
+            tau: (whole / sweeps).min(TAU),
             slope: soil.slope() * QUANTA,
             rest: 1.0 + REST,
             film: FILM * soil.slope().min(1.0) * QUANTA,
         };
         let swell = (soil.swell * 65_536.0).round() as i64;
-        let start = soil.start();
+        let start = if rule == Rule::Law { soil.start() } else { 1.0 };
         let mut setup = Setup {
             side: side as i32,
             law,
@@ -142,7 +149,7 @@ impl Ground {
         setup.survey()?;
         // Banks that are too high fail from the beginning on.
         let whole = vec![u32::MAX >> (32 - side); side].into_boxed_slice();
-        let strained = setup.steep.iter().filter(|_| setup.description.soil.cohesion > 0.0);
+        let strained = setup.steep.iter().filter(|_| rule.bonds(&setup.description.soil));
         let strained = strained.map(|key| (*key, whole.clone())).collect();
         Ok(Ground {
             strained,
@@ -155,6 +162,7 @@ impl Ground {
             setup: Arc::new(setup),
             tiles: Arc::default(),
             awake: Vec::new(),
+            speeds: Speeds::default(),
             roofs: Arc::default(),
             book: Book::default(),
         })
@@ -372,7 +380,7 @@ impl Ground {
         let mut places: Vec<_> = inside.map(|(i, k)| self.setup.place(i, k)).collect();
         places.sort_unstable();
         places.dedup();
-        let cohesive = self.soil().cohesion > 0.0;
+        let cohesive = self.setup.settings.rule.bonds(self.soil());
         for tile in places.chunk_by(|a, b| a.0 == b.0) {
             let key = tile[0].0;
             let mut bits = vec![0; side];

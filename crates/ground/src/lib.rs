@@ -8,6 +8,7 @@
 //! - [`Ground`]: the columns at an instant; a value, whose clones share what has not changed. [`Ground::advance`] makes the next tick.
 //! - [`Pour`]: material that is added, on a disc or everywhere.
 //! - [`Body`]: a closed mesh that presses, pushes and carries, or a shelf that only carries.
+//! - [`Rule`]: the law of slipping, or those of the papers for comparison.
 //! - [`Mesh`]: the surface as triangles; [`Piece`]: a part of it whose triangles stay the same at all times.
 //! - [`study`]: exact cases with their errors and orders.
 //!
@@ -83,6 +84,7 @@ mod pattern;
 mod pour;
 mod press;
 mod relief;
+mod rules;
 mod setup;
 mod slip;
 mod spans;
@@ -98,6 +100,7 @@ pub use pattern::Piece;
 pub use pour::{Place, Pour};
 pub use press::Body;
 pub use relief::Relief;
+pub use rules::Rule;
 pub use tile::Extent;
 
 /// A vector of three components.

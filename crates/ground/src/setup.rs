@@ -53,7 +53,7 @@ impl Setup {
         let Description { cell, soil, bed, depth, .. } = &self.description;
         let bed = bed.quanta("the bed of the ground", *cell, i, k)?;
         let depth = depth.quanta("the thickness of the ground", *cell, i, k)?.max(0);
-        Ok(if soil.cohesion > 0.0 { [bed, depth, 0] } else { [bed, 0, depth] })
+        Ok(if self.settings.rule.bonds(soil) { [bed, depth, 0] } else { [bed, 0, depth] })
     }
 
     /// A tile that nothing has touched.
@@ -95,7 +95,7 @@ impl Setup {
         let few = columns as u64 <= SURVEYED;
         check("a number of columns with a relief", columns as f64, few, "at most 2^26")?;
         // Cohesive banks may fail from the angle of repose on.
-        let start = if self.description.soil.cohesion > 0.0 { 1.0 } else { self.start };
+        let start = if self.settings.rule.bonds(&self.description.soil) { 1.0 } else { self.start };
         let most = (self.law.slope * start).powi(2);
         let mut steep = Vec::new();
         let [mut low, mut high] = [first; 2];

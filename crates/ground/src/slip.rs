@@ -10,7 +10,7 @@ use crate::ground::TAU;
 use crate::kernel::{Block, Law, Traits, to_float};
 use crate::tile::{Key, Tile};
 use crate::wedge::note;
-use crate::{Error, Ground};
+use crate::{Error, Ground, Rule};
 
 /// Columns around a tile on which its fluxes depend.
 const HALO: usize = 2;
@@ -62,7 +62,7 @@ impl Ground {
     }
 
     /// A place that is not at rest: x and z in m.
-    fn unrest(&self) -> [f64; 2] {
+    pub(crate) fn unrest(&self) -> [f64; 2] {
         let key = self.awake.first().or(self.fresh.first()).copied().unwrap_or_default();
         let side = self.setup.settings.side;
         let first = self.tiles.get(&key).and_then(|tile| {
@@ -75,7 +75,10 @@ impl Ground {
 
     /// One sweep of the ground and of what lies on bodies.
     pub(crate) fn step(&mut self, law: &Law) -> Result<(), Error> {
-        self.sweep(law)?;
+        match self.setup.settings.rule {
+            Rule::Law => self.sweep(law)?,
+            rule => self.sweep_by(rule)?,
+        }
         self.sweep_loads(law)
     }
 
@@ -118,7 +121,7 @@ impl Ground {
     }
 
     /// Adds the neighbours of tiles that are to be examined: a flux from one into another is computed in both.
-    fn spread_fresh(&mut self) {
+    pub(crate) fn spread_fresh(&mut self) {
         let (side, extent) = (self.setup.side, self.setup.description.extent);
         let near = self.fresh.iter().flat_map(|key| around(*key)).filter(|key| extent.has_tile(*key, side));
         let mut near: Vec<_> = near.collect();
@@ -128,7 +131,7 @@ impl Ground {
     }
 
     /// Tiles with columns that can move in a sweep, in order.
-    fn to_compute(&self) -> Vec<Key> {
+    pub(crate) fn to_compute(&self) -> Vec<Key> {
         let (side, extent) = (self.setup.side, self.setup.description.extent);
         let mut list = self.fresh.clone();
         for &key in &self.awake {
@@ -162,7 +165,7 @@ impl Ground {
     fn take_over(&mut self, list: &[Key], outcomes: Vec<Outcome>) -> Result<(), Error> {
         let mut outcomes = outcomes.into_iter().peekable();
         let before = std::mem::take(&mut self.awake);
-        let cohesive = self.soil().cohesion > 0.0;
+        let cohesive = self.setup.settings.rule.bonds(self.soil());
         let tiles = Arc::make_mut(&mut self.tiles);
         for key in list {
             match outcomes.next_if(|outcome| outcome.key == *key) {

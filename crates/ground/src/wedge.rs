@@ -36,7 +36,7 @@ pub(crate) fn note(strained: &mut BTreeMap<Key, Box<[u32]>>, key: Key, bits: &[u
 impl Ground {
     /// Loosens what lies above the planes along which banks fail, where the surface has changed since the last time.
     pub(crate) fn fail_banks(&mut self) -> Result<(), Error> {
-        if self.soil().cohesion <= 0.0 {
+        if !self.setup.settings.rule.bonds(self.soil()) {
             return Ok(());
         }
         let strained = std::mem::take(&mut self.strained);

@@ -1,5 +1,6 @@
 //! The exact cases: errors and orders of the study.
 
+use dlsys_ground::Rule;
 use dlsys_ground::study::{self, Bank};
 use dlsys_wind::study::Convergence;
 
@@ -43,6 +44,28 @@ fn a_cone_does_not_depend_on_portions() -> Outcome {
 fn a_cone_is_as_wide_between_the_axes_as_along_them() -> Outcome {
     let rows = study::round()?;
     assert!(rows.last().is_some_and(|row| row.error < 0.01), "{rows:#?}");
+    Ok(())
+}
+
+/// The rules of the papers keep the volume as they are written here, and are further from the exact heaps at any number of columns.
+#[test]
+fn the_law_is_nearer_to_the_exact_heaps_than_the_rules_of_the_papers() -> Outcome {
+    let rows = study::rules()?;
+    assert_eq!(rows.len(), 8);
+    assert!(rows.iter().all(|row| row.imbalance == 0), "{rows:#?}");
+    for columns in [8, 16] {
+        let of = |rule: Rule| rows.iter().find(|row| row.rule == rule && row.columns == columns);
+        let law = of(Rule::Law).expect("a row");
+        for rule in [Rule::Sumner, Rule::Sandbox, Rule::Li] {
+            let row = of(rule).expect("a row");
+            assert!(row.cylinder > 1.5 * law.cylinder && row.cone[0] > 1.5 * law.cone[0], "{rows:#?}");
+            // They end as heaps, not anywhere.
+            assert!(
+                row.cylinder < 0.3 && row.rest.iter().all(|angle| *angle < study::repose() + 2.0),
+                "{rows:#?}"
+            );
+        }
+    }
     Ok(())
 }
 

@@ -124,7 +124,7 @@ pub struct Options {
     pub metres: f64,
     /// Height of the floor, if there is one, its middle (x, z), and half of its side, in units of the model.
     pub floor: Option<[f64; 4]>,
-    /// Gases are followed, too: at the frames, as points. For USDA; GLB files do not hold them.
+    /// Gases are followed, too: at the frames, as points.
     pub gases: bool,
     /// Number of threads; the file does not depend on it.
     pub threads: usize,

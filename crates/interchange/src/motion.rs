@@ -7,7 +7,7 @@ use crate::track::Phase;
 
 /// Least time between two keys of a track, in seconds. Blender takes keys that are less than a hundredth of a frame apart for one, and a frame is a 24th of
 /// a second where it does not know better.
-const APART: f32 = 5e-4;
+pub(crate) const APART: f32 = 5e-4;
 
 /// Times of the model as seconds of the animation.
 #[derive(Clone, Copy, Debug)]

@@ -91,6 +91,6 @@ pub use event::MAX_ROUNDS;
 pub use kernel::Simulation;
 pub use log::{Event, ModuleState, Transition};
 pub use observe::inspect::{InspectedModule, Inspection};
-pub use settings::{BendMethod, BendSettings, Scheduler, Settings, Stats};
+pub use settings::{BendMethod, BendSettings, GroundRule, Scheduler, Settings, Stats};
 pub use surroundings::{Failure, Force, Inputs, Surroundings};
 pub use world::{brief, describe};

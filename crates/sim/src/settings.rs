@@ -64,6 +64,35 @@ impl Default for BendSettings {
     }
 }
 
+/// What moves soil that is too steep; the crate `dlsys-ground` describes the rules.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum GroundRule {
+    /// The conservative law of slipping.
+    #[default]
+    Law,
+    /// Erosion of Sumner, O'Brien, Hodgins 1999, for comparison.
+    Sumner,
+    /// Erosion of Onoue, Nishita 2003, for comparison.
+    Sandbox,
+    /// Slices of Li, Moshell 1993, made stable, for comparison.
+    Li,
+}
+
+impl GroundRule {
+    /// The rules with their names on the command line.
+    pub const NAMED: [(&'static str, GroundRule); 4] = [
+        ("law", GroundRule::Law),
+        ("sumner", GroundRule::Sumner),
+        ("sandbox", GroundRule::Sandbox),
+        ("li", GroundRule::Li),
+    ];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        GroundRule::NAMED.iter().find(|(_, rule)| *rule == self).map_or("", |(name, _)| name)
+    }
+}
+
 /// How a simulation is run.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -97,6 +126,8 @@ pub struct Settings {
     pub transitions: bool,
     /// How stems that bend are followed. Growth that reads nothing of them does not depend on it.
     pub bending: BendSettings,
+    /// By which rule soil slips. Growth that reads nothing of it does not depend on it.
+    pub ground_rule: GroundRule,
 }
 
 impl Default for Settings {
@@ -115,6 +146,7 @@ impl Default for Settings {
             slow: false,
             transitions: false,
             bending: BendSettings::default(),
+            ground_rule: GroundRule::default(),
         }
     }
 }

@@ -12,6 +12,53 @@ pub fn exact_ground_table(rows: &[Convergence]) -> String {
     exact_table(title, rows, |resolution| brief(resolution, 4))
 }
 
+/// The law of slipping and the rules of the papers side by side.
+///
+/// # Errors
+/// An error of a ground, which is a defect.
+pub fn ground_rule_table() -> Result<String, ground::Error> {
+    let mut out = format!(
+        "ground: the law and the rules of the papers; differences from the exact heaps in volumes, repose {}°\n",
+        brief(ground::study::repose(), 4)
+    );
+    let mut table = Table::default();
+    let heads = [
+        "",
+        "columns",
+        "cylinder",
+        "cone",
+        "in 10 portions",
+        "bias at 45°",
+        "rests at",
+        "and at 45°",
+        "volume",
+        "column updates",
+        "seconds",
+    ];
+    table.push(heads.map(str::to_owned));
+    for row in ground::study::rules()? {
+        let ground::study::RuleRow { rule, columns, cylinder, cone, bias, rest, imbalance, updates, seconds } =
+            row;
+        let error = |value: f64| format!("{value:.1e}");
+        let angle = |value: f64| format!("{value:.1}°");
+        table.push([
+            if columns == 8 { rule.name().to_owned() } else { String::new() },
+            columns.to_string(),
+            error(cylinder),
+            error(cone[0]),
+            error(cone[1]),
+            format!("{:+.1} %", 100.0 * bias),
+            angle(rest[0]),
+            angle(rest[1]),
+            imbalance.to_string(),
+            updates.to_string(),
+            brief(seconds, 2),
+        ]);
+    }
+    table.write("  ", &mut out);
+    Ok(out)
+}
+
 /// Measures the cost of sweeps and of scenes.
 ///
 /// # Errors

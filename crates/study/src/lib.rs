@@ -60,7 +60,7 @@ pub use error::Error;
 pub use falls::{Landings, exact_fall_table};
 pub use files::{csv, hard_csv, hard_json, json};
 pub use gases::{exact_gas_table, gas_speed_table};
-pub use grounds::{exact_ground_table, ground_speed_table};
+pub use grounds::{exact_ground_table, ground_rule_table, ground_speed_table};
 pub use hard::{CaseResult, HardPlan, Mismatch, run_case};
 pub use order::{nominal_order, observed_order};
 pub use plot::svg;

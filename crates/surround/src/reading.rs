@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use dlsys_expr::{FIELD_ARGUMENTS, Field, FieldPart, Interval};
 use dlsys_model::{Model, Units};
+use dlsys_sim::GroundRule;
 use dlsys_wind::Eddies;
 use nalgebra::Vector3;
 
@@ -42,7 +43,7 @@ pub(crate) fn layers(model: &Model) -> Result<Option<Arc<Layers>>, Error> {
         return Ok(None);
     }
     let place = Place::of_scene(&model.scenery);
-    let Some(ground) = terrain::ground(model, &place, 1)? else { return Ok(None) };
+    let Some(ground) = terrain::ground(model, &place, 1, GroundRule::Law)? else { return Ok(None) };
     let tick = 1.0 / (TICKS * place.units.time);
     model.scenery.layers.get_or_make(|| Ok(Arc::new(Layers::new(ground, (place.units.length, tick)))))
 }

@@ -17,7 +17,7 @@ use dlsys_geometry::scene::{self, MaterialId, Point, Scene};
 use dlsys_geometry::turtle;
 use dlsys_ground::{self as ground, Description, Extent, Ground};
 use dlsys_model::{Bed, Model, Soil, SoilBase};
-use dlsys_sim::{Inputs, Settings, Simulation};
+use dlsys_sim::{GroundRule, Inputs, Settings, Simulation};
 use dlsys_tree::ModuleString;
 
 use crate::Error;
@@ -126,7 +126,9 @@ impl<'m> Terrain<'m> {
     pub fn new(model: &'m Model, settings: Settings, threads: usize) -> Result<Option<Terrain<'m>>, Error> {
         let place = Place::of_scene(&model.scenery);
         reading::bind(model)?;
-        let Some(ground) = self::ground(model, &place, threads)? else { return Ok(None) };
+        let Some(ground) = self::ground(model, &place, threads, settings.ground_rule)? else {
+            return Ok(None);
+        };
         let settings = Settings { log: true, transitions: false, ..settings };
         let layers = reading::layers(model)?;
         let growth = match layers.is_some() {
@@ -517,7 +519,12 @@ pub(crate) fn from_metres(points: &[ground::Vector], metre: f64) -> Vec<Point> {
 ///
 /// # Errors
 /// Values that are out of range.
-pub(crate) fn ground(model: &Model, place: &Place, threads: usize) -> Result<Option<Ground>, Error> {
+pub(crate) fn ground(
+    model: &Model,
+    place: &Place,
+    threads: usize,
+    rule: GroundRule,
+) -> Result<Option<Ground>, Error> {
     let Some(bed) = &model.scenery.bed else { return Ok(None) };
     let metre = place.units.length;
     let description = describe(bed, &model.scenery.soils[bed.soil], metre);
@@ -525,6 +532,12 @@ pub(crate) fn ground(model: &Model, place: &Place, threads: usize) -> Result<Opt
         tick: 1.0 / TICKS,
         threads: threads.clamp(1, 1024),
         memory: MEMORY,
+        rule: match rule {
+            GroundRule::Law => ground::Rule::Law,
+            GroundRule::Sumner => ground::Rule::Sumner,
+            GroundRule::Sandbox => ground::Rule::Sandbox,
+            GroundRule::Li => ground::Rule::Li,
+        },
         ..ground::Settings::default()
     };
     let made = Ground::new(description, settings);

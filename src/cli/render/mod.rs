@@ -33,7 +33,7 @@ use crate::render::{
 };
 use crate::scene::Scene;
 use crate::session::SwayReport;
-use crate::sim::{Method, Settings, Stats, brief};
+use crate::sim::{GroundRule, Method, Settings, Stats, brief};
 use shutter::Moments;
 use turntable::Orbit;
 
@@ -432,6 +432,9 @@ impl Render<'_> {
         if crate::session::sways(model) {
             described["bend_method"] = settings.bending.method.name().into();
             described["bend_tolerance"] = settings.bending.tolerance.into();
+        }
+        if settings.ground_rule != GroundRule::Law {
+            described["ground_rule"] = settings.ground_rule.name().into();
         }
         if format.content() != Content::Mesh {
             described["size"] = json!(page.pixels);

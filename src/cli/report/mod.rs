@@ -195,6 +195,7 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
         grounds.extend(case().map_err(|error| defect(error.to_string()))?);
     }
     show(study::exact_ground_table(&grounds))?;
+    show(study::ground_rule_table().map_err(|error| defect(error.to_string()))?)?;
     let wind = crate::wind::study::statistics(SEEDS).map_err(|error| defect(error.to_string()))?;
     show(study::wind_table(&wind))?;
     show(study::speed_table().map_err(defect)?)?;

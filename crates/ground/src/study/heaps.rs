@@ -2,8 +2,8 @@
 
 use dlsys_wind::study::Convergence;
 
-use super::{SLOPE, SWEEPS, dry, heap, integral, mean};
-use crate::{Error, Extent, Ground, Place, Pour, Relief};
+use super::{SLOPE, SWEEPS, dry, heap, heap_by, integral, mean};
+use crate::{Error, Extent, Ground, Place, Pour, Relief, Rule};
 
 /// Columns in the radius or width that a case is about.
 const FINENESS: [i32; 3] = [8, 16, 32];
@@ -14,21 +14,26 @@ const FINENESS: [i32; 3] = [8, 16, 32];
 ///
 /// More sweeps or memory than allowed, which is a defect.
 pub fn cylinder() -> Result<Vec<Convergence>, Error> {
+    let mut found = Vec::new();
+    for n in FINENESS {
+        found.push((f64::from(n), collapsed(n, Rule::Law)?.1));
+    }
+    Ok(Convergence::rows("collapsing cylinder: difference from the exact heap (volumes)", 0.0, &found))
+}
+
+/// What becomes of the cylinder of [`cylinder`], with some columns in its radius, and the difference from the exact heap.
+pub(super) fn collapsed(n: i32, rule: Rule) -> Result<(Ground, f64), Error> {
     let (radius, height, k) = (0.5_f64, 0.4_f64, SLOPE);
     let plateau = -height / (2.0 * k) + (radius * radius - height * height / (12.0 * k * k)).sqrt();
     let exact = move |r: f64| height.min(height - k * (r - plateau)).max(0.0);
-    let mut found = Vec::new();
-    for n in FINENESS {
-        let cell = radius / f64::from(n);
-        let inside = move |x: f64, z: f64| if x.hypot(z) <= radius { height } else { 0.0 };
-        let extent = Extent::around(9 * n / 5);
-        let mut ground = heap(cell, extent, dry(k), Relief::Level(0.0), mean(cell, inside))?;
-        ground.settle(SWEEPS)?;
-        let volume = std::f64::consts::PI * radius * radius * height;
-        let error = integral(&ground, |x, z, h| (h - exact(x.hypot(z))).abs()) / volume;
-        found.push((f64::from(n), error));
-    }
-    Ok(Convergence::rows("collapsing cylinder: difference from the exact heap (volumes)", 0.0, &found))
+    let cell = radius / f64::from(n);
+    let inside = move |x: f64, z: f64| if x.hypot(z) <= radius { height } else { 0.0 };
+    let extent = Extent::around(9 * n / 5);
+    let mut ground = heap_by(rule, cell, extent, dry(k), Relief::Level(0.0), mean(cell, inside))?;
+    ground.settle(SWEEPS)?;
+    let volume = std::f64::consts::PI * radius * radius * height;
+    let error = integral(&ground, |x, z, h| (h - exact(x.hypot(z))).abs()) / volume;
+    Ok((ground, error))
 }
 
 /// A row of columns along x.
@@ -80,10 +85,11 @@ pub fn strip() -> Result<Vec<Convergence>, Error> {
 const CONE: f64 = 0.5;
 
 /// A cone that is poured onto a level bed in some portions, each of which comes to rest.
-fn poured(n: i32, portions: u32) -> Result<Ground, Error> {
+pub(super) fn poured(n: i32, portions: u32, rule: Rule) -> Result<Ground, Error> {
     let cell = CONE / f64::from(n);
     let volume = std::f64::consts::PI * SLOPE * CONE * CONE * CONE / 3.0;
-    let mut ground = heap(cell, Extent::around(6 * n / 5), dry(SLOPE), Relief::Level(0.0), |_, _| 0.0)?;
+    let extent = Extent::around(6 * n / 5);
+    let mut ground = heap_by(rule, cell, extent, dry(SLOPE), Relief::Level(0.0), |_, _| 0.0)?;
     let place = Place::Disc { centre: [0.0; 2], radius: 0.1 * CONE };
     let pour = Pour { id: 0, place, rate: volume / f64::from(portions) };
     for _ in 0..portions {
@@ -94,7 +100,7 @@ fn poured(n: i32, portions: u32) -> Result<Ground, Error> {
 }
 
 /// Difference of a poured cone from the exact one, in parts of its volume.
-fn cone_error(ground: &Ground) -> f64 {
+pub(super) fn cone_error(ground: &Ground) -> f64 {
     let volume = std::f64::consts::PI * SLOPE * CONE * CONE * CONE / 3.0;
     integral(ground, |x, z, h| (h - (SLOPE * (CONE - x.hypot(z))).max(0.0)).abs()) / volume
 }
@@ -107,7 +113,7 @@ fn cone_error(ground: &Ground) -> f64 {
 pub fn cone() -> Result<Vec<Convergence>, Error> {
     let mut found = Vec::new();
     for n in FINENESS {
-        found.push((f64::from(n), cone_error(&poured(n, 1)?)));
+        found.push((f64::from(n), cone_error(&poured(n, 1, Rule::Law)?)));
     }
     Ok(Convergence::rows("poured cone: difference from the exact one (volumes)", 0.0, &found))
 }
@@ -118,10 +124,10 @@ pub fn cone() -> Result<Vec<Convergence>, Error> {
 ///
 /// More sweeps or memory than allowed, which is a defect.
 pub fn portions() -> Result<Vec<Convergence>, Error> {
-    let once = cone_error(&poured(8, 1)?);
+    let once = cone_error(&poured(8, 1, Rule::Law)?);
     let mut found = Vec::new();
     for portions in [1, 10, 40] {
-        found.push((f64::from(portions), cone_error(&poured(8, portions)?) / once));
+        found.push((f64::from(portions), cone_error(&poured(8, portions, Rule::Law)?) / once));
     }
     Ok(Convergence::rows("poured cone by portions: error relative to one portion", 1.0, &found))
 }
@@ -137,6 +143,13 @@ fn contour(ground: &Ground, direction: [f64; 2], height: f64) -> f64 {
     low
 }
 
+/// Radius of the contour of a cone at a quarter of its height between two axes, relative to that along an axis.
+pub(super) fn roundness(ground: &Ground) -> f64 {
+    let height = 0.25 * SLOPE * CONE;
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    contour(ground, [half, half], height) / contour(ground, [1.0, 0.0], height)
+}
+
 /// A poured cone is round: radius of its contour at a quarter of the height between two axes, relative to that along an axis.
 ///
 /// # Errors
@@ -145,11 +158,7 @@ fn contour(ground: &Ground, direction: [f64; 2], height: f64) -> f64 {
 pub fn round() -> Result<Vec<Convergence>, Error> {
     let mut found = Vec::new();
     for n in FINENESS {
-        let ground = poured(n, 1)?;
-        let height = 0.25 * SLOPE * CONE;
-        let half = std::f64::consts::FRAC_1_SQRT_2;
-        let ratio = contour(&ground, [half, half], height) / contour(&ground, [1.0, 0.0], height);
-        found.push((f64::from(n), ratio));
+        found.push((f64::from(n), roundness(&poured(n, 1, Rule::Law)?)));
     }
     Ok(Convergence::rows("poured cone: its contour turned by 45°", 1.0, &found))
 }

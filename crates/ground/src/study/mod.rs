@@ -2,11 +2,12 @@
 
 use dlsys_wind::study::Convergence;
 
-use crate::{Description, Error, Extent, Ground, Relief, Settings, Soil};
+use crate::{Description, Error, Extent, Ground, Relief, Rule, Settings, Soil};
 
 mod banks;
 mod heaps;
 mod presses;
+mod rules;
 mod scenes;
 mod shelves;
 mod speed;
@@ -15,6 +16,7 @@ mod vessels;
 pub use banks::{Bank, bank};
 pub use heaps::{cone, cone_on_incline, cylinder, dam, portions, round, strip};
 pub use presses::{ball, sphere, sphere_rim};
+pub use rules::{RuleRow, repose, rules};
 pub use scenes::{footprints, posts, runner, sandbox, torus};
 pub use shelves::{bucket, disc, square};
 pub use speed::{Speed, speeds};
@@ -49,8 +51,20 @@ fn heap(
     bed: Relief,
     depth: impl Fn(f64, f64) -> f64 + Send + Sync + 'static,
 ) -> Result<Ground, Error> {
+    heap_by(Rule::Law, cell, extent, soil, bed, depth)
+}
+
+/// Loose material on a bed that slips by a rule.
+fn heap_by(
+    rule: Rule,
+    cell: f64,
+    extent: Extent,
+    soil: Soil,
+    bed: Relief,
+    depth: impl Fn(f64, f64) -> f64 + Send + Sync + 'static,
+) -> Result<Ground, Error> {
     let description = Description { cell, extent, soil, bed, depth: Relief::function(depth) };
-    Ground::new(description, Settings::default())
+    Ground::new(description, Settings { rule, ..Settings::default() })
 }
 
 /// The mean over a column of a function that jumps, from 16 × 16 places.

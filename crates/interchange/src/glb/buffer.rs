@@ -14,11 +14,12 @@ const FLOAT: u32 = 5126;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// Views of the buffer: attributes of corners, triangles, tracks, places in pictures; a view for each picture follows.
+/// Views of the buffer: attributes of corners, triangles, tracks, places in pictures, sizes of points; a view for each picture follows.
 const ATTRIBUTES: usize = 0;
 const TRIANGLES: usize = 1;
 const TRACKS: usize = 2;
 const PLACES: usize = 3;
+const SIZES: usize = 4;
 
 /// What vectors are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +35,7 @@ pub(super) enum Kind {
 /// Accessors and bytes.
 #[derive(Debug, Default)]
 pub(super) struct Buffer {
-    views: [Vec<u8>; 4],
+    views: [Vec<u8>; 5],
     pictures: Vec<Arc<Picture>>,
     accessors: Vec<Accessor>,
     /// Accessors by a hash of all that they are, bytes included.
@@ -64,6 +65,11 @@ impl Buffer {
     /// Places of corners in a picture.
     pub(super) fn places(&mut self, values: &[[f32; 2]]) -> usize {
         self.floats(values.as_flattened(), 2, "VEC2", PLACES, false)
+    }
+
+    /// Sizes of points.
+    pub(super) fn sizes(&mut self, values: &[f32]) -> usize {
+        self.floats(values, 1, "SCALAR", SIZES, false)
     }
 
     /// The file of a picture; returns its number among the images.
@@ -144,9 +150,10 @@ impl Buffer {
     /// Puts accessors and views into the document and returns the bytes of its buffer.
     pub(super) fn finish(self, document: &mut Document) -> Vec<u8> {
         let mut bytes = Vec::new();
-        let mut numbers = [0; 4];
+        let mut numbers = [0; 5];
         let attributes = |width| (Some(width), Some(ARRAY_BUFFER));
-        let kinds = [attributes(12), (None, Some(ELEMENT_ARRAY_BUFFER)), (None, None), attributes(8)];
+        let kinds =
+            [attributes(12), (None, Some(ELEMENT_ARRAY_BUFFER)), (None, None), attributes(8), attributes(4)];
         for ((view, number), (byte_stride, target)) in self.views.iter().zip(&mut numbers).zip(kinds) {
             if view.is_empty() {
                 continue;

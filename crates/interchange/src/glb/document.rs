@@ -69,11 +69,19 @@ pub(super) struct Mesh {
     pub(super) primitives: Vec<Primitive>,
 }
 
+/// The mode of a primitive that is points.
+pub(super) const POINTS: u32 = 0;
+
 #[derive(Debug, Serialize)]
 pub(super) struct Primitive {
     pub(super) attributes: BTreeMap<&'static str, usize>,
-    pub(super) indices: usize,
+    /// None of points.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) indices: Option<usize>,
     pub(super) material: usize,
+    /// Triangles, which is what a file means that does not say, or [`POINTS`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) mode: Option<u32>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) targets: Vec<BTreeMap<&'static str, usize>>,
 }

@@ -5,6 +5,7 @@
 
 mod buffer;
 mod document;
+mod gases;
 mod motion;
 mod normals;
 
@@ -110,6 +111,7 @@ impl Writer<'_> {
                 self.document.nodes.push(node);
             }
         }
+        self.gases(&mut animation);
         if !animation.channels.is_empty() {
             self.document.animations.push(animation);
         }
@@ -164,9 +166,9 @@ impl Writer<'_> {
                 let places: Vec<[f32; 2]> = pinned[i].iter().map(|[u, v]| [*u, 1.0 - v]).collect();
                 attributes.insert("TEXCOORD_0", self.buffer.places(&places));
             }
-            let indices = self.buffer.indices(triangles);
+            let indices = Some(self.buffer.indices(triangles));
             let material = self.material(Some(*material));
-            primitives.push(Primitive { attributes, indices, material, targets });
+            primitives.push(Primitive { attributes, indices, material, mode: None, targets });
         }
         primitives
     }
@@ -205,11 +207,12 @@ impl Writer<'_> {
             ("NORMAL", self.buffer.vectors(&normals, Kind::Normal)),
         ]);
         let triangles: Vec<u32> = tube.triangles.iter().flatten().copied().collect();
-        let indices = self.buffer.indices(&triangles);
+        let indices = Some(self.buffer.indices(&triangles));
         let number = self.document.meshes.len();
         let name = format!("stem-{number}");
         let material = self.material(Some(material));
-        let primitives = vec![Primitive { attributes, indices, material, targets: targets.to_vec() }];
+        let primitives =
+            vec![Primitive { attributes, indices, material, mode: None, targets: targets.to_vec() }];
         self.document.meshes.push(Mesh { name, primitives });
         self.stems.insert(key, number);
         number
@@ -253,9 +256,9 @@ impl Writer<'_> {
             ("POSITION", self.buffer.vectors(&corners, Kind::Place)),
             ("NORMAL", self.buffer.vectors(&[[0.0, 1.0, 0.0]; 4], Kind::Normal)),
         ]);
-        let indices = self.buffer.indices(&triangles);
+        let indices = Some(self.buffer.indices(&triangles));
         let material = self.material(None);
-        let primitives = vec![Primitive { attributes, indices, material, targets: Vec::new() }];
+        let primitives = vec![Primitive { attributes, indices, material, mode: None, targets: Vec::new() }];
         let mesh = Some(self.document.meshes.len());
         self.document.meshes.push(Mesh { name: "ground".to_owned(), primitives });
         let node = self.document.nodes.len();
