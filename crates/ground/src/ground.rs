@@ -11,7 +11,7 @@ use crate::load::Floors;
 use crate::material::REST;
 use crate::rules::Speeds;
 use crate::setup::Setup;
-use crate::tile::{COLUMN_BYTES, Extent, Key, QUANTA, Tile};
+use crate::tile::{COLUMN_BYTES, Extent, Key, QUANTA, SLID_BYTES, Tile};
 use crate::wedge::note;
 use crate::{Error, Relief, Rule, Soil};
 
@@ -43,12 +43,14 @@ pub struct Settings {
     pub memory: usize,
     /// What moves material that is too steep.
     pub rule: Rule,
+    /// How far the surface slides is followed, for pictures on it ([`Ground::slid`]).
+    pub slides: bool,
 }
 
 impl Default for Settings {
     /// Ticks of 1/120 s, tiles of 32, one thread, 1024 MB, the law of this crate.
     fn default() -> Settings {
-        Settings { tick: 1.0 / 120.0, side: 32, threads: 1, memory: 1024, rule: Rule::Law }
+        Settings { tick: 1.0 / 120.0, side: 32, threads: 1, memory: 1024, rule: Rule::Law, slides: false }
     }
 }
 
@@ -117,7 +119,7 @@ impl Ground {
         check("a size of columns (m)", *cell, (1e-6..=1e4).contains(cell), "1e-6 to 10,000")?;
         extent.check()?;
         soil.check()?;
-        let Settings { tick, side, threads, memory, rule } = settings;
+        let Settings { tick, side, threads, memory, rule, slides: _ } = settings;
         check("a tick (s)", tick, (1e-6..=10.0).contains(&tick), "1e-6 to 10")?;
         check("a side of tiles", side as f64, side == 16 || side == 32, "16 or 32")?;
         check("a number of threads", threads as f64, (1..=1024).contains(&threads), "1 to 1024")?;
@@ -223,6 +225,15 @@ impl Ground {
             None => self.setup.untouched(i, k).map_or(top, |[bed, bonded, _]| bed + bonded),
         };
         (top - base) as f64 / QUANTA * self.cell()
+    }
+
+    /// How far what is seen of a column has slid along x and z, in m: 0 where that is not followed ([`Settings::slides`]). Neighbours differ by half
+    /// a cell along each axis at most, so that a picture on the surface is not stretched more.
+    pub fn slid(&self, i: i32, k: i32) -> [f64; 2] {
+        let (i, k) = self.extent().mirrored(i, k);
+        let (key, index) = self.setup.place(i, k);
+        let slid = self.tiles.get(&key).and_then(|tile| tile.slid.as_ref()).map(|slid| slid[index]);
+        slid.unwrap_or_default().map(|cells| cells * self.cell())
     }
 
     /// Height of a column in quanta.
@@ -349,7 +360,8 @@ impl Ground {
             None => {
                 let columns = setup.settings.side * setup.settings.side;
                 let most = setup.settings.memory;
-                if (self.tiles.len() + 1) * columns * COLUMN_BYTES > most << 20 {
+                let bytes = if setup.settings.slides { COLUMN_BYTES + SLID_BYTES } else { COLUMN_BYTES };
+                if (self.tiles.len() + 1) * columns * bytes > most << 20 {
                     let (i, k) = setup.column(key, 0);
                     let at = [i, k].map(|at| f64::from(at) * setup.description.cell);
                     return Err(Error::Memory { most, at });

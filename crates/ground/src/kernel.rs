@@ -287,6 +287,12 @@ impl Block {
         }
     }
 
+    /// What flows through a column, along x and z, in quanta.
+    pub fn stream(&self, row: usize, place: usize) -> [f64; 2] {
+        let (w, at) = (self.width, row * self.width + place);
+        [self.fx[at] + self.fx[at - 1], self.fz[at] + self.fz[at - w]].map(|against| -0.5 * against)
+    }
+
     /// Adds the fluxes to the loose material of a row of columns, and returns the bits of those with a flux, from the first place on.
     pub fn apply(&self, row: usize, places: &Range<usize>, loose: &mut [i64]) -> u32 {
         let (w, n) = (self.width, places.len());

@@ -86,6 +86,7 @@ mod press;
 mod relief;
 mod rules;
 mod setup;
+mod slide;
 mod slip;
 mod spans;
 pub mod study;

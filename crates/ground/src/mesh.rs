@@ -14,6 +14,8 @@ use crate::{Ground, Piece, Vector};
 pub struct Mesh {
     /// Points in m.
     pub points: Vec<Vector>,
+    /// How far what is seen at each point has slid, in m along x and z; empty where that is not followed.
+    pub slid: Vec<[f64; 2]>,
     /// Triangles as numbers of points, counterclockwise as seen from above.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -151,12 +153,16 @@ impl<'a> Weaver<'a> {
 
     /// The number of the point of a column.
     fn point(&mut self, (i, k): (i32, i32)) -> u32 {
-        let (ground, points, columns) = (self.ground, &mut self.mesh.points, &mut self.columns);
+        let (ground, columns) = (self.ground, &mut self.columns);
+        let Mesh { points, slid, .. } = &mut self.mesh;
         *self.numbers.entry((i, k)).or_insert_with(|| {
             let cell = ground.cell();
             let height = ground.shown(i, k) as f64 / QUANTA * cell;
             columns.push((i, k));
             points.push(Vector::new(f64::from(i) * cell, height, f64::from(k) * cell));
+            if ground.setup.settings.slides {
+                slid.push(ground.slid(i, k));
+            }
             points.len() as u32 - 1
         })
     }

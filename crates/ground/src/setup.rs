@@ -78,7 +78,7 @@ impl Setup {
             (0..count).map(at).collect()
         });
         let awake = vec![0; self.settings.side].into_boxed_slice();
-        Ok(Tile { bed, bonded, loose, packed: zeros(), slope, awake, pressed: false, fallen })
+        Ok(Tile { bed, bonded, loose, packed: zeros(), slope, slid: None, awake, pressed: false, fallen })
     }
 
     /// Examines the untouched surface: how low and how high it is, and where it is too steep.

@@ -8,12 +8,13 @@ use std::sync::Arc;
 
 use crate::ground::TAU;
 use crate::kernel::{Block, Law, Traits, to_float};
+use crate::slide;
 use crate::tile::{Key, Tile};
 use crate::wedge::note;
 use crate::{Error, Ground, Rule};
 
 /// Columns around a tile on which its fluxes depend.
-const HALO: usize = 2;
+pub(crate) const HALO: usize = 2;
 /// Fewest tiles for which threads are started.
 const MANY: usize = 32;
 
@@ -21,7 +22,7 @@ const MANY: usize = 32;
 const FAR: usize = 3;
 
 /// The neighbours of a tile and itself, in rows; none beyond the edges.
-type Around<'a> = [Option<&'a Tile>; 9];
+pub(crate) type Around<'a> = [Option<&'a Tile>; 9];
 
 /// Rows of a block and places in them.
 type Area = (Range<usize>, Range<usize>);
@@ -30,6 +31,8 @@ type Area = (Range<usize>, Range<usize>);
 struct Outcome {
     key: Key,
     loose: Box<[i64]>,
+    /// How far columns have slid, if that is followed.
+    slid: Option<Box<[[f64; 2]]>>,
     awake: Box<[u32]>,
     updates: u64,
 }
@@ -169,7 +172,7 @@ impl Ground {
         let tiles = Arc::make_mut(&mut self.tiles);
         for key in list {
             match outcomes.next_if(|outcome| outcome.key == *key) {
-                Some(Outcome { loose, awake, updates, .. }) => {
+                Some(Outcome { loose, awake, updates, slid, .. }) => {
                     self.book.updates += updates;
                     let moves = awake.iter().any(|row| *row != 0);
                     if moves && cohesive {
@@ -179,6 +182,7 @@ impl Ground {
                     if moves || shared.is_awake() {
                         let tile = Arc::make_mut(shared);
                         (tile.loose, tile.awake) = (loose, awake);
+                        tile.slid = slid.or(tile.slid.take());
                     }
                     if moves {
                         self.awake.push(*key);
@@ -280,7 +284,9 @@ impl<'a> Worker<'a> {
                 }
             }
         }
-        Some(Outcome { key, loose, awake, updates: (rows.len() * places.len()) as u64 })
+        let follows = ground.setup.settings.slides && awake.iter().any(|row| *row != 0);
+        let slid = follows.then(|| slide::slid(&self.block, &tiles, (&rows, &places), side, &awake));
+        Some(Outcome { key, loose, slid, awake, updates: (rows.len() * places.len()) as u64 })
     }
 
     /// Rows of the block and places in them that a flux can reach; none if nothing near is awake.

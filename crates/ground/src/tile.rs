@@ -24,6 +24,8 @@ pub(crate) struct Tile {
     pub packed: Box<[i64]>,
     /// Tangent of the angle of repose in quanta, where it is not that of the soil everywhere.
     pub slope: Option<Box<[f64]>>,
+    /// How far what is seen of each column has slid along x and z, in cells, where that is followed and anything has.
+    pub slid: Option<Box<[[f64; 2]]>>,
     /// One bit for each column of a row: whether it slipped in the last sweep or was changed since.
     pub awake: Box<[u32]>,
     /// Whether a column has been compressed.
@@ -34,6 +36,8 @@ pub(crate) struct Tile {
 
 /// Bytes of a column.
 pub(crate) const COLUMN_BYTES: usize = 33;
+/// More of them where it is followed how far it has slid.
+pub(crate) const SLID_BYTES: usize = 16;
 
 impl Tile {
     /// Height of what cannot slip.

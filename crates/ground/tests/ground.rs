@@ -85,6 +85,53 @@ fn tiles_threads_and_copies_do_not_matter() -> Outcome {
     Ok(())
 }
 
+/// Where it is followed how far the surface slides, heights are the same bits; tiles and threads do not matter, and neighbours differ by half a column at most.
+#[test]
+fn the_surface_slides_with_what_slips() -> Outcome {
+    let run = |slides, side, threads| {
+        let settings = Settings { side, threads, slides, ..Settings::default() };
+        let mut ground = Ground::new(rugged(5), settings)?;
+        steps(&mut ground, 6)?;
+        Ok::<_, Error>(ground)
+    };
+    let (plain, first) = (run(false, 32, 1)?, run(true, 32, 1)?);
+    assert!(heights(&plain) == heights(&first));
+    let slid = |ground: &Ground| {
+        let Extent { x, z } = ground.extent();
+        let rows = (z[0]..=z[1]).map(|k| (x[0]..=x[1]).map(|i| ground.slid(i, k)).collect::<Vec<_>>());
+        rows.collect::<Vec<_>>()
+    };
+    let all = slid(&first);
+    assert!(all == slid(&run(true, 16, 2)?));
+    assert!(slid(&plain).into_iter().flatten().all(|slid| slid == [0.0; 2]));
+    let cell = first.cell();
+    let apart = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
+    let along = all.iter().flat_map(|row| row.windows(2).map(|pair| apart(pair[0], pair[1])));
+    let across = all.windows(2).flat_map(|rows| rows[0].iter().zip(&rows[1]).map(|(a, b)| apart(*a, *b)));
+    let most = along.chain(across).fold(0.0, f64::max);
+    assert!(most > 0.4 * cell && most <= 0.5 * cell * (1.0 + 1e-12), "{}", most / cell);
+    // A heap of sand slides outwards on all sides.
+    let description = Description {
+        cell: 0.01,
+        extent: Extent::around(40),
+        soil: Soil::sand(),
+        bed: Relief::Level(0.0),
+        depth: Relief::function(|x, z| if x.hypot(z) < 0.1 { 0.15 } else { 0.0 }),
+    };
+    let mut ground = Ground::new(description, Settings { slides: true, ..Settings::default() })?;
+    ground.settle(100_000)?;
+    for (i, k) in [(12, 0), (-12, 0), (0, 12), (0, -12), (9, 9), (-9, 9)] {
+        let [x, z] = ground.slid(i, k);
+        let outwards = (x * f64::from(i) + z * f64::from(k)) / f64::from(i).hypot(f64::from(k));
+        assert!(
+            outwards > cell && (x * f64::from(k) - z * f64::from(i)).abs() < outwards,
+            "{i} {k}: {x} {z}"
+        );
+    }
+    assert_eq!(ground.slid(39, 39), [0.0; 2]);
+    Ok(())
+}
+
 #[test]
 fn what_happens_far_away_changes_nothing_here() -> Outcome {
     let plane = || Description {
