@@ -4,8 +4,10 @@ use std::fs;
 use std::path::PathBuf;
 
 use dlsys::render::{Fit, Format, FrameWriter, Page, Size, Smoothness, Survey, View, pixels_by};
-use dlsys::scene::{Point, Scene, Vector};
+use dlsys::scene::{MaterialId, Point, Scene, Vector};
 use dlsys::session::Session;
+use dlsys::sim::Settings;
+use dlsys::surround::Terrain;
 use dlsys::tree::ModuleString;
 use dlsys::turtle;
 use serde_json::Value;
@@ -321,6 +323,46 @@ fn pages_have_the_picture_and_frames_a_copy() {
     let expected =
         ["four.png", "frame-0000.obj", "frame-0001.obj", "frame-0002.obj", "manifest.json", "materials.mtl"];
     assert_eq!(names, expected);
+}
+
+/// A picture on ground has a place at each point, stays where nothing slips, and goes outwards with a heap that does; heights are those without it.
+#[test]
+fn a_picture_on_ground_slides_with_the_material() {
+    let text = |picture: &str| {
+        format!(
+            "soil dry = sand, repose 30, flow 0.2\nground dry cell 0.02 depth 0.5 extent 0.8{picture} \
+             height if x^2 + z^2 < 0.04 then 0.2 else 0\ninitial string: F(0.1)\n"
+        )
+    };
+    let home = Home::new("");
+    let ground = |picture: &str| {
+        home.put("model.dls", text(picture).as_bytes());
+        let session = home.session();
+        let terrain = Terrain::new(&session.model, Settings::default(), 1).expect("a ground").expect("of soil");
+        terrain.at(1.5, MaterialId::LEAF, None).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let plain = ground("");
+    let covered = ground(" texture \"pictures/four.png\" size 0.25");
+    assert!(plain.vertices == covered.vertices && plain.normals == covered.normals && plain.places.is_empty());
+    assert_eq!(covered.places.len(), covered.vertices.len());
+    let (mut outwards, mut most) = (0, 0.0_f64);
+    for (point, [u, v]) in covered.vertices.iter().zip(&covered.places) {
+        let [dx, dz] = [point.x - 0.25 * u, point.z + 0.25 * v];
+        let radius = point.x.hypot(point.z);
+        most = most.max(dx.hypot(dz));
+        if radius > 0.6 {
+            assert!(dx.hypot(dz) < 1e-12, "{point}: {dx} {dz}");
+        } else if radius > 0.16 && radius < 0.25 {
+            assert!(dx * point.x + dz * point.z > 0.0, "{point}: {dx} {dz}");
+            outwards += 1;
+        }
+    }
+    assert!(outwards > 100 && most > 0.02, "{outwards} {most}");
+    let (code, message) = {
+        home.put("model.dls", text(" size 2").as_bytes());
+        bad(&["check", &home.text("model.dls")])
+    };
+    assert!(code == 1 && message.contains("model.dls:2:48") && message.contains("no picture"), "{message}");
 }
 
 /// Each with its place, and advice.

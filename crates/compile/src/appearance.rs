@@ -109,7 +109,7 @@ pub fn color(text: &Text, scope: &mut Scope) -> Option<Rgb> {
 }
 
 /// The picture on a surface, one with those of other surfaces if it is the same.
-fn picture(
+pub(crate) fn picture(
     text: &Text,
     known: &[Arc<SurfaceShape>],
     scope: &mut Scope,

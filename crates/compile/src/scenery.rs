@@ -69,9 +69,9 @@ pub(crate) fn build(
                 builder.once("ground", *span);
                 builder.scenery.ground = builder.scope.constant_value(&document.expressions, *height);
             }
-            Item::Bed { soil, file, attributes } => {
+            Item::Bed { soil, file, attributes, textures } => {
                 builder.once("ground", *span);
-                builder.bed((soil, file.as_ref()), attributes, *span);
+                builder.bed((soil, file.as_ref()), (attributes, textures), appearance, *span);
             }
             Item::Pour { soil, attributes } => builder.pour(soil, attributes, *span),
             Item::Light(direction) => {

@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::advice;
-use crate::appearance::color;
+use crate::appearance::{color, picture as picture_of};
 use crate::physics::{MAX_DECLARED, Quantity, not_negative, positive, shown};
 use crate::scenery::Builder;
 use crate::scope::Variables;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::Program;
-use dlsys_model::{Bed, HeightGrid, Pour, Relief, Soil, SoilBase};
+use dlsys_model::{Appearance, Bed, HeightGrid, Pour, Relief, Soil, SoilBase, Texture};
 use dlsys_syntax::ast::{Attribute, Expression, Expressions, Name, Text};
 use dlsys_syntax::is_inside;
 
@@ -77,6 +77,8 @@ const DEPTH: Quantity = positive(
 );
 const EXTENT: Quantity =
     positive("extent", "", "the ground goes from -E to E in x and z, and E is greater than 0: `extent 5`");
+const SIZE: Quantity =
+    positive("size", "", "the width of the picture on the ground is greater than 0, in units of the model: `size 0.3`");
 const RATE: Quantity =
     not_negative("rate", "", "it is 0 or greater: a volume for each unit of t, or without `at` a height");
 const RADIUS: Quantity = positive("radius", "", "the radius of the disc on which it falls is greater than 0");
@@ -173,9 +175,29 @@ impl Builder<'_> {
         found
     }
 
-    pub(crate) fn bed(&mut self, (soil, file): (&Name, Option<&Text>), attributes: &[Attribute], span: Span) {
+    pub(crate) fn bed(
+        &mut self,
+        (soil, file): (&Name, Option<&Text>),
+        (attributes, textures): (&[Attribute], &[Text]),
+        appearance: &Appearance,
+        span: Span,
+    ) {
         let number = self.soil_number(soil);
-        let [cell, depth, height, extent] = self.sorted(attributes, ["cell", "depth", "height", "extent"]);
+        let [cell, depth, height, extent, size] =
+            self.sorted(attributes, ["cell", "depth", "height", "extent", "size"]);
+        if let [first, second, ..] = textures {
+            self.scope.diagnostics.push(advice::given_twice("`texture`", [first.span, second.span]));
+        }
+        if let Some(size) = size.filter(|_| textures.is_empty()) {
+            self.scope.diagnostics.push(
+                Diagnostic::error("this ground has no picture")
+                    .at(size.span, "`size` is the width of one")
+                    .help("declare it, `texture \"sand.png\"`, or remove `size`"),
+            );
+        }
+        let picture = textures.first();
+        let picture =
+            picture.and_then(|text| picture_of(text, &appearance.surfaces, self.scope, self.files));
         if cell.is_none() {
             self.scope.diagnostics.push(
                 Diagnostic::error("this ground has no cells")
@@ -186,6 +208,7 @@ impl Builder<'_> {
         let width = self.attribute(cell, &CELL);
         let below = self.attribute(depth, &DEPTH);
         let reach = self.attribute(extent, &EXTENT);
+        let across = self.attribute(size, &SIZE);
         let relief = match (file, height) {
             (Some(file), Some(height)) => {
                 self.scope.diagnostics.push(
@@ -215,8 +238,17 @@ impl Builder<'_> {
             );
             return;
         }
-        self.scenery.bed =
-            Some(Bed { soil: number, cell: width, depth: below, height: relief, extent: reach, span });
+        let texture = picture.map(|picture| Texture { picture, repeats: true });
+        self.scenery.bed = Some(Bed {
+            soil: number,
+            cell: width,
+            depth: below,
+            height: relief,
+            extent: reach,
+            texture,
+            texture_size: across.unwrap_or(Bed::TEXTURE_CELLS * width),
+            span,
+        });
     }
 
     /// A program over `x` and `z`; 0 without an expression.

@@ -44,11 +44,6 @@ impl Ground {
         pieces
     }
 
-    /// How far what is seen at the points of a piece has slid, in m along x and z.
-    pub fn slid_at(&self, piece: &Piece) -> Vec<[f64; 2]> {
-        piece.columns.iter().map(|(i, k)| self.slid(*i, *k)).collect()
-    }
-
     /// The points of a piece, in m.
     pub fn points(&self, piece: &Piece) -> Vec<Vector> {
         let cell = self.cell();

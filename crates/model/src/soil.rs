@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::Rgb;
+use crate::{Rgb, Texture};
 use dlsys_diagnostic::Span;
 use dlsys_expr::Program;
 
@@ -74,6 +74,10 @@ pub struct Bed {
     pub height: Relief,
     /// It extends from -E to E in x and z.
     pub extent: f64,
+    /// The picture on it, which is repeated.
+    pub texture: Option<Texture>,
+    /// The width of the picture.
+    pub texture_size: f64,
     /// The place of the declaration in the text.
     pub span: Span,
 }
@@ -85,6 +89,8 @@ impl Bed {
         self.height.at(inside(x), inside(z), self.extent)
     }
 
+    /// The columns across a picture, if the text gives no size.
+    pub const TEXTURE_CELLS: f64 = 32.0;
     /// Half the number of columns on a side, if the text gives no extent.
     pub const CELLS: f64 = 500.0;
     /// The largest number of columns on a side.

@@ -123,7 +123,10 @@ impl<'m> Nursery<'m> {
         let mut nursery = Nursery::with_blanks(model, settings, &mut turtle::blanks(model).into_iter());
         if let Some(bed) = &model.scenery.bed {
             let color = Color::hex(model.scenery.soils[bed.soil].color);
-            nursery.earth = nursery.blank.palette.add("ground", color);
+            nursery.earth = match &bed.texture {
+                Some(texture) => nursery.blank.palette.add_textured("ground", texture),
+                None => nursery.blank.palette.add("ground", color),
+            };
         }
         nursery
     }

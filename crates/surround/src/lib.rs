@@ -43,6 +43,7 @@ mod masses;
 mod motion;
 mod outlets;
 mod paths;
+mod picture;
 mod place;
 mod points;
 mod pressing;

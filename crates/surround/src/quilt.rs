@@ -44,10 +44,15 @@ impl<'m> Terrain<'m> {
         let moment = self.reach(&mut state, until, motion)?;
         let metre = self.place.units.length;
         let with_mesh = |piece: ground::Piece| {
-            let points = from_metres(&moment.ground.points(&piece), metre);
+            let points = moment.ground.points(&piece);
             let triangles = piece.triangles.iter().map(|corners| (*corners, material));
-            let mesh = Arc::new(scene::Mesh::of_triangles(points, &[], triangles));
-            (piece, mesh)
+            let mesh = scene::Mesh::of_triangles(from_metres(&points, metre), &[], triangles);
+            // Where points move, their places in the picture stay: no program that plays such a file moves them.
+            let mesh = match self.picture {
+                Some(picture) => picture.put_on(mesh, &points, &[]),
+                None => mesh,
+            };
+            (piece, Arc::new(mesh))
         };
         Ok(Quilt { pieces: moment.ground.pieces().into_iter().map(with_mesh).collect(), material })
     }

@@ -26,6 +26,7 @@ use crate::descent::Descent;
 use crate::layers::{Layer, Layers};
 use crate::marks::{Marks, Recent};
 use crate::motion::{MOST_TICKS, Motion};
+use crate::picture::Picture;
 use crate::place::Place;
 use crate::pressing::{Placed, placed};
 use crate::reading;
@@ -52,6 +53,8 @@ pub struct Terrain<'m> {
     pub(crate) place: Place,
     /// Some module may draw a body or a shelf.
     has_bodies: bool,
+    /// The picture on it.
+    pub(crate) picture: Option<Picture>,
     /// What rules read of the ground, if they do.
     layers: Option<Arc<Layers>>,
     pub(crate) state: Mutex<State<'m>>,
@@ -150,7 +153,8 @@ impl<'m> Terrain<'m> {
             mesh: None,
         };
         let has_bodies = !model.scenery.solids.is_empty() || !model.scenery.shelves.is_empty();
-        Ok(Some(Terrain { model, settings, place, has_bodies, layers, state: Mutex::new(state) }))
+        let picture = model.scenery.bed.as_ref().and_then(|bed| Picture::of(bed, place.units.length));
+        Ok(Some(Terrain { model, settings, place, has_bodies, picture, layers, state: Mutex::new(state) }))
     }
 
     /// The surface of the ground, and of what lies on bodies, at a time of the model, in its units, of a material. Stems move as they do here.
@@ -467,14 +471,16 @@ impl<'m> Terrain<'m> {
     /// The surface in units of the model.
     fn mesh(&self, ground: &Ground, material: MaterialId) -> scene::Mesh {
         let metre = self.place.units.length;
-        let mut points = Vec::new();
-        let mut triangles = Vec::new();
-        for mesh in [ground.mesh(), ground.heaps()] {
-            let first = points.len() as u32;
-            points.extend(from_metres(&mesh.points, metre));
-            triangles.extend(mesh.triangles.iter().map(|corners| (corners.map(|n| first + n), material)));
+        let (mut surface, heaps) = (ground.mesh(), ground.heaps());
+        let first = surface.points.len() as u32;
+        surface.points.extend(heaps.points);
+        surface.triangles.extend(heaps.triangles.iter().map(|corners| corners.map(|n| first + n)));
+        let triangles = surface.triangles.iter().map(|corners| (*corners, material));
+        let mesh = scene::Mesh::of_triangles(from_metres(&surface.points, metre), &[], triangles);
+        match self.picture {
+            Some(picture) => picture.put_on(mesh, &surface.points, &surface.slid),
+            None => mesh,
         }
-        scene::Mesh::of_triangles(points, &[], triangles)
     }
 
     /// The time of the model at a tick.
@@ -532,6 +538,7 @@ pub(crate) fn ground(
         tick: 1.0 / TICKS,
         threads: threads.clamp(1, 1024),
         memory: MEMORY,
+        slides: bed.texture.is_some(),
         rule: match rule {
             GroundRule::Law => ground::Rule::Law,
             GroundRule::Sumner => ground::Rule::Sumner,

@@ -362,7 +362,7 @@ pub enum Item {
         /// Its colours, as `#rrggbb` or `#rgb`: more than one is an error.
         colors: Vec<Text>,
     },
-    /// `ground soil cell d depth h height f(x, z) extent e`: ground that gives way.
+    /// `ground soil cell d depth h height f(x, z) extent e texture "picture" size w`: ground that gives way.
     Bed {
         /// The name of its soil.
         soil: Name,
@@ -370,6 +370,8 @@ pub enum Item {
         file: Option<Text>,
         /// Its values, in the order written.
         attributes: Vec<Attribute>,
+        /// Its pictures: more than one is an error.
+        textures: Vec<Text>,
     },
     /// `pour soil rate r at x, y, z radius r`: material that is added.
     Pour {

@@ -237,6 +237,8 @@ pub static DECLARATIONS: [Declaration; 35] = [
             option("depth", Follow::Value),
             option("height", Follow::Value),
             option("extent", Follow::Value),
+            option("texture", Follow::Text),
+            option("size", Follow::Value),
         ],
         begins: Begins::BeforeValue,
         written: "a floor is written `ground 0`; ground of a soil, `ground clay cell 0.01 depth 0.3`",

@@ -67,7 +67,11 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
             Item::Plant { name: parts.name(), file: parts.text(), settings: parts.assignments()? }
         }
         Rule::ground_item => match parts.name_if_any() {
-            Some(soil) => Item::Bed { soil, file: parts.text_if_any(), attributes: parts.attributes()? },
+            Some(soil) => {
+                let file = parts.text_if_any();
+                let (attributes, textures) = parts.values_and_texts()?;
+                Item::Bed { soil, file, attributes, textures }
+            }
             None => Item::Ground(parts.expression()?),
         },
         Rule::light_item => Item::Light(parts.triple()?),
@@ -81,7 +85,7 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
         Rule::tissue_item => Item::Tissue { name: parts.name(), attributes: parts.attributes()? },
         Rule::gas_item => {
             let name = parts.name();
-            let (attributes, colors) = parts.values_and_colors()?;
+            let (attributes, colors) = parts.values_and_texts()?;
             Item::Gas { name, attributes, colors }
         }
         Rule::sheet_item => Item::Sheet {
@@ -94,7 +98,7 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
         Rule::shelf_item => Item::Shelf(parts.names()),
         Rule::soil_item => {
             let name = parts.name();
-            let (attributes, colors) = parts.values_and_colors()?;
+            let (attributes, colors) = parts.values_and_texts()?;
             Item::Soil { name, attributes, colors }
         }
         Rule::pour_item => Item::Pour { soil: parts.name(), attributes: parts.attributes()? },
@@ -198,10 +202,11 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
         Item::Soil { name, attributes, colors } => {
             format!("soil {} = {}", name.text, colored(expressions, attributes, colors))
         }
-        Item::Bed { soil, file, attributes } => {
+        Item::Bed { soil, file, attributes, textures } => {
             let from = file.as_ref().map(|file| format!("from \"{}\"", file.text));
             let rest = (!attributes.is_empty()).then(|| written(expressions, attributes, " "));
-            let parts: Vec<String> = [from, rest].into_iter().flatten().collect();
+            let textures = textures.iter().map(|file| format!("texture \"{}\"", file.text));
+            let parts: Vec<String> = [from, rest].into_iter().flatten().chain(textures).collect();
             format!("ground {} {}", soil.text, parts.join(" "))
         }
         Item::Pour { soil, attributes } => {
@@ -298,19 +303,19 @@ impl<'i> Parts<'_, '_, 'i> {
         Ok(all)
     }
 
-    /// Attributes with values, and the colours among them.
-    fn values_and_colors(&mut self) -> Built<(Vec<Attribute>, Vec<Text>)> {
-        let (mut attributes, mut colors) = (Vec::new(), Vec::new());
+    /// Attributes with values, and the texts of the others among them: colours or pictures.
+    fn values_and_texts(&mut self) -> Built<(Vec<Attribute>, Vec<Text>)> {
+        let (mut attributes, mut texts) = (Vec::new(), Vec::new());
         while let Some(next) = self.pairs.as_slice().first() {
             match next.clone().into_inner().find(|pair| pair.as_rule() == Rule::text) {
-                Some(color) => {
+                Some(text) => {
                     self.pair();
-                    colors.push(self.builder.text(&color));
+                    texts.push(self.builder.text(&text));
                 }
                 None => attributes.push(self.attribute()?),
             }
         }
-        Ok((attributes, colors))
+        Ok((attributes, texts))
     }
 
     fn assignments(&mut self) -> Built<Vec<(Name, Expression)>> {

@@ -55,7 +55,7 @@ fn words(rule: Rule) -> Option<&'static str> {
         kolmogorov => "`kolmogorov` and three values",
         flow_kind | uniform | flow_word => "`uniform`, `source`, `sink` or `vortex`",
         flow_part | flow_place | decay => "an option such as `at`",
-        bed_part | bed_word => "`cell`, `depth`, `height` or `extent` and a value",
+        bed_part | bed_word => "`cell`, `depth`, `height`, `extent` or `size` and a value",
         soil_part | soil_word | soil_base => "a material such as `sand`, or a value such as `repose 30`",
         pour_part | pour_word | pour_place => "`rate`, `at` or `radius`",
         tissue_part | tissue_word | sag => "`stiffness`, `density`, `damping`, `thickness` or `sag`",

@@ -1,0 +1,29 @@
+//! The picture on ground of soil: where each point of the surface lies in it, and how it slides with the material.
+
+use dlsys_geometry::scene::Mesh;
+use dlsys_ground as ground;
+use dlsys_model::Bed;
+
+/// The picture that a ground has, in SI.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Picture {
+    /// Its width in m.
+    size: f64,
+}
+
+impl Picture {
+    pub(crate) fn of(bed: &Bed, metre: f64) -> Option<Picture> {
+        bed.texture.as_ref().map(|_| Picture { size: bed.texture_size * metre })
+    }
+
+    /// A mesh of these points, in m, under the picture. What is seen at the first points has slid; the others have none of that.
+    pub(crate) fn put_on(self, mesh: Mesh, points: &[ground::Vector], slid: &[[f64; 2]]) -> Mesh {
+        let slid = slid.iter().copied().chain(std::iter::repeat([0.0; 2]));
+        // Seen from above with x to the right, z points down.
+        let place = |(point, [dx, dz]): (&ground::Vector, [f64; 2])| {
+            [(point.x - dx) / self.size, (dz - point.z) / self.size]
+        };
+        let places = points.iter().zip(slid).map(place).collect();
+        mesh.under_picture(places)
+    }
+}
