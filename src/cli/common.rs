@@ -8,12 +8,13 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use super::args::IncludeArgs;
+use super::args::{IncludeArgs, RenderArgs};
 use super::output;
 use super::shared::{Scheduler, SharedArgs};
 use crate::compile::Setting;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::Frames;
+use crate::render::Layout;
 use crate::scene::Scene;
 use crate::session::{Detail, DrawError, Nursery, Session, SwayReport};
 use crate::sim::{self, Settings, Simulation, Stats};
@@ -320,6 +321,18 @@ impl ModelRun {
             self.note(vec![warning]);
             self.remarks.lock().unwrap_or_else(PoisonError::into_inner).lacks_gases = true;
         }
+    }
+
+    /// Notes that a sheet of frames is not seen from the camera that the model declares, unless a flag says from where it is.
+    pub fn note_unused_camera(&self, args: &RenderArgs) {
+        if args.layout == Layout::Frames || args.view.is_some() || args.perspective.is_some() {
+            return;
+        }
+        let Some(camera) = &self.session.model.scenery.camera else { return };
+        let warning = Diagnostic::warning(format!("--layout {} does not use the camera", args.layout.name()))
+            .at(camera.span, "stages on a sheet are moved apart, and seen from the front")
+            .help("choose another direction, `--view 20,10`, or render a file for each frame, which the camera takes");
+        self.note(vec![warning]);
     }
 
     /// Frames are drawn without ground of soil, whose pieces [`Nursery::draw_quilt`] draws.

@@ -205,6 +205,28 @@ fn a_model_that_fails_later_leaves_no_frames() {
     assert_eq!((status, out.exists()), (1, false));
 }
 
+/// Sheets are not seen from the camera of a model, which is said unless another direction is chosen.
+#[test]
+fn a_sheet_says_that_it_does_not_use_the_camera() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("a.dls");
+    let text = "camera at 0, 1, 5 towards 0, 0.5, 0\ninitial string: F(1)\n";
+    std::fs::write(&model, text).expect("written");
+    let sheet = |more: &[&str]| {
+        let out = folder.path().join("sheet");
+        let [model, out] = [&model, &out].map(|path| path.to_str().expect("UTF-8"));
+        let line = ["render", model, "-o", out, "--at", "0,1", "--format", "png", "--width", "60", "--force"];
+        let output = dlsys(&[&line, more].concat());
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).expect("text")
+    };
+    let said = sheet(&["--layout", "grid"]);
+    assert!(said.contains("--layout grid does not use the camera") && said.contains("a.dls:1:1"), "{said}");
+    for more in [&["--layout", "grid", "--view", "20,10"][..], &[]] {
+        assert_eq!(sheet(more), "");
+    }
+}
+
 #[test]
 fn all_models_render() {
     for model in ["dragon", "anabaena", "leaf", "campanula", "lychnis", "hieracium-apex"] {

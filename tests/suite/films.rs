@@ -162,7 +162,7 @@ fn flags_that_make_no_film_are_refused_and_files_of_others_stay() {
     let thesis = folder.path().join("thesis.gif");
     fs::write(&thesis, "years of work").expect("written");
     let thesis = thesis.to_str().expect("UTF-8");
-    let cases: [(&[&str], &str); 17] = [
+    let cases: [(&[&str], &str); 18] = [
         (&["gif", "-o", thesis], "is not a GIF file"),
         (&["gif", "-o", "a.gif", "--background", "none"], "no transparency"),
         (&["webp", "-o", "a.gif"], "`-o a.webp`"),
@@ -173,6 +173,10 @@ fn flags_that_make_no_film_are_refused_and_files_of_others_stay() {
         (&["usda", "-o", "a.usda", "--orbit", "90"], "has a camera"),
         (&["obj", "-o", "a", "--orbit", "90"], "--orbit is for pictures"),
         (&["png", "-o", "a", "--orbit", "90", "--layout", "grid"], "--orbit does not go with --layout grid"),
+        (
+            &["png", "-o", "a", "--camera", "0,1,5/0,0,0", "--layout", "grid"],
+            "--camera does not go with --layout grid",
+        ),
         (&["png", "-o", "a", "--orbit", "90", "--orbit-frames", "9"], "`--at T`"),
         (&["svg", "-o", "a", "--shutter", "0.5"], "--shutter averages pixels, and SVG files have none"),
         (&["obj", "-o", "a", "--shutter", "0.5"], "choose --format png, or a film"),

@@ -338,12 +338,15 @@ fn a_picture_on_ground_slides_with_the_material() {
     let ground = |picture: &str| {
         home.put("model.dls", text(picture).as_bytes());
         let session = home.session();
-        let terrain = Terrain::new(&session.model, Settings::default(), 1).expect("a ground").expect("of soil");
+        let terrain =
+            Terrain::new(&session.model, Settings::default(), 1).expect("a ground").expect("of soil");
         terrain.at(1.5, MaterialId::LEAF, None).unwrap_or_else(|error| panic!("{error}"))
     };
     let plain = ground("");
     let covered = ground(" texture \"pictures/four.png\" size 0.25");
-    assert!(plain.vertices == covered.vertices && plain.normals == covered.normals && plain.places.is_empty());
+    assert!(
+        plain.vertices == covered.vertices && plain.normals == covered.normals && plain.places.is_empty()
+    );
     assert_eq!(covered.places.len(), covered.vertices.len());
     let (mut outwards, mut most) = (0, 0.0_f64);
     for (point, [u, v]) in covered.vertices.iter().zip(&covered.places) {
@@ -362,7 +365,7 @@ fn a_picture_on_ground_slides_with_the_material() {
         home.put("model.dls", text(" size 2").as_bytes());
         bad(&["check", &home.text("model.dls")])
     };
-    assert!(code == 1 && message.contains("model.dls:2:48") && message.contains("no picture"), "{message}");
+    assert!(code == 1 && message.contains("model.dls:2:43") && message.contains("no picture"), "{message}");
 }
 
 /// Each with its place, and advice.

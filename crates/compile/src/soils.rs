@@ -77,8 +77,11 @@ const DEPTH: Quantity = positive(
 );
 const EXTENT: Quantity =
     positive("extent", "", "the ground goes from -E to E in x and z, and E is greater than 0: `extent 5`");
-const SIZE: Quantity =
-    positive("size", "", "the width of the picture on the ground is greater than 0, in units of the model: `size 0.3`");
+const SIZE: Quantity = positive(
+    "size",
+    "",
+    "the width of the picture on the ground is greater than 0, in units of the model: `size 0.3`",
+);
 const RATE: Quantity =
     not_negative("rate", "", "it is 0 or greater: a volume for each unit of t, or without `at` a height");
 const RADIUS: Quantity = positive("radius", "", "the radius of the disc on which it falls is greater than 0");
@@ -196,8 +199,7 @@ impl Builder<'_> {
             );
         }
         let picture = textures.first();
-        let picture =
-            picture.and_then(|text| picture_of(text, &appearance.surfaces, self.scope, self.files));
+        let picture = picture.and_then(|text| picture_of(text, &appearance.surfaces, self.scope, self.files));
         if cell.is_none() {
             self.scope.diagnostics.push(
                 Diagnostic::error("this ground has no cells")

@@ -113,6 +113,12 @@ pub fn of_layouts(args: &RenderArgs) -> Result<(), Failure> {
             args.layout.name()
         )));
     }
+    if args.camera.is_some() && args.layout != Layout::Frames {
+        return Err(usage(format!(
+            "--camera does not go with --layout {}: stages on a sheet are moved apart, and seen from one direction; choose --view AZIMUTH,ELEVATION, or a file for each frame",
+            args.layout.name()
+        )));
+    }
     let mut times: Vec<f64> = args.shared.at.iter().flatten().copied().collect();
     times.sort_by(f64::total_cmp);
     times.dedup();

@@ -65,6 +65,7 @@ fn specimens(args: &RenderArgs, format: Format, mut run: ModelRun, seeds: Seeds)
         run.note_missing_gases("an SVG picture");
     }
     let begun = Instant::now();
+    run.note_unused_camera(args);
     turntable::repeat(args, &mut run.times);
     let never = || false;
     let threads = flags::threads(args);
@@ -126,6 +127,7 @@ pub fn render_run(
     if format.content() == Content::Vectors {
         run.note_missing_gases("an SVG picture");
     }
+    run.note_unused_camera(args);
     turntable::repeat(args, &mut run.times);
     let mut clock = run.clock;
     let threads = flags::threads(args);
