@@ -10,6 +10,7 @@ use std::fmt::Write;
 use super::lighting::Lighting;
 use super::number;
 use super::painter::{DECIMALS, SHADES, Style, text};
+use super::tube::can_join;
 use dlsys_geometry::scene::{Color, Point, Scene, Segment};
 
 /// Stems thinner than this many pixels of the page have one colour.
@@ -24,6 +25,9 @@ const PLACES: [f64; 5] = [-1.0, -0.55, 0.0, 0.55, 1.0];
 const STRAIGHT: f64 = 0.999_99;
 /// How far a piece of a line reaches under the one that continues it, in pixels of the page: less can be seen as a seam.
 const OVERLAP: f64 = 0.7;
+/// How much of the next piece a mitred one takes along, in widths.
+const STUB: f64 = 0.2;
+
 /// The mean width of a segment, in pixels of the page.
 pub(super) fn pixels_across(segment: &Segment, style: Style) -> f64 {
     let Style { fit, pixels, .. } = style;
@@ -68,6 +72,8 @@ pub(super) enum End {
     Round,
     /// Round, in the midst of a stem.
     Joint,
+    /// Mitred, where a stem of a flat drawing bends and goes on in this segment, as tubes do.
+    Mitre(usize),
     /// Straight, where the stroke continues or something else hides the rest.
     Straight,
 }
@@ -98,9 +104,18 @@ impl<'a> Strokes<'a> {
         let mut ends = vec![[End::Round; 2]; scene.segments.len()];
         for (i, segment) in scene.segments.iter().enumerate() {
             let Some(before) = segment.follows else { continue };
-            let is_straight = is_smooth(&scene.segments[before], segment) && parted(before, i);
-            let end = if is_straight { End::Straight } else { End::Joint };
-            (ends[before][1], ends[i][0]) = (end, end);
+            let previous = &scene.segments[before];
+            let is_smooth = is_smooth(previous, segment);
+            let bends = !is_smooth && style.fit.light.is_flat();
+            let radii = [previous.widths[1], segment.widths[0]];
+            let radii = radii.map(|width| width.resolve(style.fit.default_width) / 2.0);
+            (ends[before][1], ends[i][0]) = if is_smooth && parted(before, i) {
+                (End::Straight, End::Straight)
+            } else if bends && can_join(previous, segment, radii) {
+                (End::Mitre(i), End::Mitre(before))
+            } else {
+                (End::Joint, End::Joint)
+            };
         }
         Strokes {
             scene,
@@ -164,6 +179,14 @@ impl<'a> Strokes<'a> {
             Point::new(to.x + along.x, to.y + along.y, to.z)
         };
         let mut look = format!(" stroke=\"{paint}\" stroke-width=\"{from}\"");
+        if ends.iter().any(|end| matches!(end, End::Mitre(_))) {
+            let end = if ends[1] == End::Straight { overlap(a, b) } else { b };
+            let data = self.mitred(ends, [a, end], wa);
+            let has_cap = |end| matches!(end, End::Round | End::Joint);
+            let cap = if ends.into_iter().any(has_cap) { "" } else { " stroke-linecap=\"butt\"" };
+            let attributes = format!(" fill=\"none\"{look} stroke-linejoin=\"miter\"{cap}");
+            return Some(Stroke::Path { attributes, data });
+        }
         match ends.map(|end| end == End::Straight) {
             [false, false] => {}
             [true, false] => return outline(half_round(a, b, wa / 2.0)),
@@ -179,6 +202,26 @@ impl<'a> Strokes<'a> {
         }
         let attributes = format!("{look} x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"");
         Some(Stroke::Element { name: "line", attributes })
+    }
+
+    /// The path of a stroke, at mitred ends with a little of the one that goes on there: what joins the two is the corner of both.
+    fn mitred(&self, ends: [End; 2], places: [Point; 2], width: f64) -> String {
+        let stub = |k: usize| {
+            let End::Mitre(other) = ends[k] else { return None };
+            let other = &self.scene.segments[other];
+            let far = self.style.project(if k == 0 { other.start } else { other.end });
+            let way = (far - places[k]).xy();
+            let length = way.norm();
+            let part = (STUB * width).min(length) / length;
+            (length > 0.0).then(|| [places[k].x + part * way.x, places[k].y + part * way.y])
+        };
+        let [a, b] = places.map(|place| [place.x, place.y]);
+        let all = [stub(0), Some(a), Some(b), stub(1)];
+        let mut data = String::new();
+        for (number, place) in all.iter().flatten().enumerate() {
+            push(&mut data, if number == 0 { "M" } else { "L" }, place);
+        }
+        data
     }
 
     /// The colour of a stem between two places of the picture, or a reference to its gradient.

@@ -341,7 +341,7 @@ impl<'s> Tubes<'s> {
 }
 
 /// Whether two segments can share a ring, or the plane of it where they have these radii there.
-fn can_join(a: &Segment, b: &Segment, radii: [f64; 2]) -> bool {
+pub(super) fn can_join(a: &Segment, b: &Segment, radii: [f64; 2]) -> bool {
     /// Most that a shoulder may reach beyond the thinner one, as a part of its radius: it would be a spike.
     const OVERHANG: f64 = 0.1;
     let cos = a.direction.dot(&b.direction);
