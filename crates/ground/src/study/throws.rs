@@ -36,7 +36,7 @@ pub fn shed() -> Result<Vec<Convergence>, Error> {
         let at = |y: f64| sphere(Vector::new(0.003, y, -0.002), 0.1, 32);
         let (triangles, low, high): (_, Arc<[Vector]>, Arc<[Vector]>) = (at(0.0).1, at(0.05).0, at(5.05).0);
         let still = Body::still(1, "a ball", triangles, Arc::clone(&low));
-        ground.advance(&[], &[still.clone()])?;
+        ground.advance(&[], std::slice::from_ref(&still))?;
         let whole = ground.sticking();
         ground.advance(&[], &[Body { from: low, to: Arc::clone(&high), ..still.clone() }])?;
         let high = Body { from: Arc::clone(&high), to: high, ..still };
