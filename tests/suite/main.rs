@@ -38,6 +38,7 @@ mod listings;
 mod meadow;
 mod organs;
 mod pages;
+mod particles;
 mod pictures;
 mod plants;
 mod ported;

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use dlsys_diagnostic::{Diagnostic, Severity, Span};
-use dlsys_model::{DETACH, ELASTIC, GROUND, Kind, KindId, Model, SOURCE};
+use dlsys_model::{DETACH, ELASTIC, GROUND, Kind, KindId, Model, SOURCE, Soil};
 use dlsys_syntax::foreign_syntax;
 
 /// The argument of a module that names a tissue or a gas, if it is a constant.
@@ -216,9 +216,19 @@ pub fn plants_as_bodies(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Warns of gas that ground of soil does not stop, and of shelves without a ground whose material they could carry.
+/// Warns of soil that is to be shed and does not stick, of gas that ground of soil does not stop, and of shelves without a ground whose material they could carry.
 pub fn soil(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
     let scenery = &model.scenery;
+    let idle =
+        |soil: &&Soil| soil.stick.unwrap_or(0.0) == 0.0 && (soil.shed.is_some() || soil.grain.is_some());
+    for soil in scenery.soils.iter().filter(idle) {
+        let word = if soil.shed.is_some() { "shed" } else { "grain" };
+        diagnostics.push(
+            Diagnostic::warning(format!("`{word}` does nothing here"))
+                .at(soil.span, "nothing of this soil sticks to bodies")
+                .help("let some stick: `stick 0.001` is a layer of 1 mm"),
+        );
+    }
     match (&scenery.bed, scenery.shelves.first()) {
         (Some(bed), _) if scenery.gases.iter().any(|gas| gas.fall >= 0.0) => diagnostics.push(
             Diagnostic::warning("gas goes through ground of soil")

@@ -68,6 +68,30 @@ const SWELL: Quantity = Quantity {
         "it is the part by which loosened soil expands, from 0 to 1: 0.1 to 0.3 for loam",
     )
 };
+const STICK: Quantity = Quantity {
+    most: 1.0,
+    ..not_negative(
+        "amount that sticks",
+        " m",
+        "it is the volume in m³ that a square metre of a body takes up where it touches the soil, from 0 to 1: `stick 0.001` is a layer of 1 mm",
+    )
+};
+const SHED: Quantity = Quantity {
+    most: 1e6,
+    ..positive(
+        "time constant",
+        " s",
+        "it is greater than 0 and at most 1e6: after `shed 0.1` seconds a part 1/e still sticks to a body that has left the ground",
+    )
+};
+const GRAIN: Quantity = Quantity {
+    most: 1000.0,
+    ..positive(
+        "diameter",
+        " m",
+        "the diameter of the particles that are thrown up is greater than 0 and at most 1000 m: `grain 0.003`",
+    )
+};
 const CELL: Quantity =
     positive("cell", "", "the width of a column is greater than 0, in units of the model: `cell 0.01`");
 const DEPTH: Quantity = positive(
@@ -94,7 +118,10 @@ impl Builder<'_> {
             ("snow", SoilBase::Snow),
             ("soil", SoilBase::Soil),
         ];
-        const WORDS: [&str; 8] = ["repose", "inner", "push", "rough", "flow", "cohesion", "weight", "swell"];
+        const WORDS: [&str; 11] = [
+            "repose", "inner", "push", "rough", "flow", "cohesion", "weight", "swell", "stick", "shed",
+            "grain",
+        ];
         if let Some(before) = self.scenery.soils.iter().find(|soil| soil.name == name.text) {
             let twice = Diagnostic::error(format!("the soil `{}` is declared twice", name.text))
                 .at(name.span, "the second time")
@@ -124,7 +151,8 @@ impl Builder<'_> {
                     .help("keep one of them, and add values that differ: `soil wet = sand, repose 45`"),
             );
         }
-        let [repose, inner, push, rough, flow, cohesion, weight, swell] = self.sorted(attributes, WORDS);
+        let [repose, inner, push, rough, flow, cohesion, weight, swell, stick, shed, grain] =
+            self.sorted(attributes, WORDS);
         if let [first, second, ..] = colors {
             self.scope.diagnostics.push(advice::given_twice("`color`", [first.span, second.span]));
         }
@@ -154,6 +182,9 @@ impl Builder<'_> {
             cohesion: self.attribute(cohesion, &COHESION),
             weight: self.attribute(weight, &WEIGHT),
             swell: self.attribute(swell, &SWELL),
+            stick: self.attribute(stick, &STICK),
+            shed: self.attribute(shed, &SHED),
+            grain: self.attribute(grain, &GRAIN),
             color: colors.first().and_then(|text| color(text, self.scope)).unwrap_or(base.color()),
             span,
         };

@@ -6,7 +6,7 @@ use crate::{Body, Error, Ground, Pour};
 const PARTS: f64 = 10_000.0;
 
 impl Ground {
-    /// The next tick: pours are added, bodies move, and what is too steep slips. Bodies that were there in the tick before and are not in the list
+    /// The next tick: particles land, pours are added, bodies move, what is too steep slips, and bodies take up material and shed it. Bodies that were there in the tick before and are not in the list
     /// are gone.
     ///
     /// # Errors
@@ -26,14 +26,17 @@ impl Ground {
             }
             parts.push(count as u32);
         }
-        self.poured_on = !pours.is_empty();
-        self.keep_bodies(bodies)?;
+        self.falls = !pours.is_empty() || !self.particles.is_empty();
+        let tick = self.setup.settings.tick;
+        let span = [self.time(), (self.book.ticks + 1) as f64 * tick];
+        self.keep_bodies(bodies, span)?;
         let (law, sweeps) = (self.setup.law, self.setup.sweeps);
         for body in bodies {
             self.move_body(body, 0.0)?;
         }
+        self.land(span)?;
         for pour in pours {
-            self.pour(pour, self.setup.settings.tick)?;
+            self.pour(pour, tick)?;
         }
         for sweep in 0..sweeps {
             for (body, count) in bodies.iter().zip(&parts) {
@@ -46,6 +49,7 @@ impl Ground {
             self.slip(&law)?;
         }
         self.fail_banks()?;
+        self.stick_and_shed(bodies, span)?;
         self.book.ticks += 1;
         Ok(())
     }

@@ -37,6 +37,17 @@ pub enum Error {
         /// Where the next columns are needed: x and z, in m.
         at: [f64; 2],
     },
+    /// More particles in the air than allowed.
+    #[error(
+        "more than {most} particles are in the air, the last of them from ({}, {}) m: larger ones, or less that sticks, are fewer",
+        at[0], at[1]
+    )]
+    Particles {
+        /// The allowed number.
+        most: usize,
+        /// Where the next one begins: x and z, in m.
+        at: [f64; 2],
+    },
     /// Material that still slips after the allowed number of sweeps.
     #[error("the ground around ({}, {}) m still slips after {sweeps} sweeps, the most that is allowed", at[0], at[1])]
     Sweeps {

@@ -3,12 +3,14 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
+use crate::coat::Coats;
 use crate::cover::Foot;
 use crate::error::check;
 use crate::graph::Graph;
 use crate::kernel::Law;
 use crate::load::Floors;
 use crate::material::REST;
+use crate::particles::Particle;
 use crate::rules::Speeds;
 use crate::setup::Setup;
 use crate::tile::{COLUMN_BYTES, Extent, Key, QUANTA, SLID_BYTES, Tile};
@@ -81,10 +83,13 @@ pub struct Ground {
     /// Their graph; none where it has to be made anew.
     pub(crate) graph: Option<Arc<Graph>>,
     pub(crate) stirred: bool,
-    /// Whether something is poured in this tick, which bodies far above the ground may catch.
-    pub(crate) poured_on: bool,
     /// Speeds of slices, where the rule has any.
     pub(crate) speeds: Speeds,
+    /// Whether something is poured in this tick, or in the air, which bodies far above the ground may catch.
+    pub(crate) falls: bool,
+    /// What sticks to bodies, by their identity, and what they have thrown up.
+    pub(crate) coats: Arc<BTreeMap<u64, Arc<Coats>>>,
+    pub(crate) particles: Arc<Vec<Particle>>,
     pub(crate) book: Book,
 }
 
@@ -159,7 +164,9 @@ impl Ground {
             floors: Arc::default(),
             graph: None,
             stirred: false,
-            poured_on: false,
+            falls: false,
+            coats: Arc::default(),
+            particles: Arc::default(),
             fresh: setup.steep.clone(),
             setup: Arc::new(setup),
             tiles: Arc::default(),
@@ -319,7 +326,7 @@ impl Ground {
             .collect()
     }
 
-    /// Volume that columns have gained less what was added, in 2^-16 quanta of a column: always 0.
+    /// Volume that columns, loads, what sticks to bodies and what is in the air have gained less what was added, in 2^-16 quanta of a column: always 0.
     pub fn imbalance(&self) -> i128 {
         let side = self.setup.side;
         let extent = self.extent();
@@ -337,7 +344,8 @@ impl Ground {
             }
         }
         let carried: i128 = self.floors.values().flatten().map(|floor| i128::from(floor.load)).sum();
-        gained + (carried << 16) + self.book.swollen - (self.book.poured << 16)
+        let apart = carried + self.sticking_quanta() + self.airborne_quanta();
+        gained + (apart << 16) + self.book.swollen - (self.book.poured << 16)
     }
 
     /// The tile of a key, made if it is not in memory, with all that has fallen.

@@ -7,7 +7,7 @@
 //! - [`Soil`]: angles of repose, mobility, cohesion and weight of a material.
 //! - [`Ground`]: the columns at an instant; a value, whose clones share what has not changed. [`Ground::advance`] makes the next tick.
 //! - [`Pour`]: material that is added, on a disc or everywhere.
-//! - [`Body`]: a closed mesh that presses, pushes and carries, or a shelf that only carries.
+//! - [`Body`]: a closed mesh that presses, pushes, carries and throws up what sticks to it, or a shelf that only carries.
 //! - [`Rule`]: the law of slipping, or those of the papers for comparison.
 //! - [`Mesh`]: the surface as triangles; [`Piece`]: a part of it whose triangles stay the same at all times.
 //! - [`study`]: exact cases with their errors and orders.
@@ -68,6 +68,7 @@
 #![warn(missing_docs)]
 
 mod clock;
+mod coat;
 mod contour;
 mod cover;
 mod error;
@@ -80,6 +81,7 @@ mod load;
 mod material;
 mod mesh;
 mod noise;
+mod particles;
 mod pattern;
 mod pour;
 mod press;
@@ -97,6 +99,7 @@ pub use error::Error;
 pub use ground::{Description, Ground, Settings};
 pub use material::Soil;
 pub use mesh::Mesh;
+pub use particles::Flight;
 pub use pattern::Piece;
 pub use pour::{Place, Pour};
 pub use press::Body;

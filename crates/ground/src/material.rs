@@ -25,10 +25,18 @@ pub struct Soil {
     pub weight: f64,
     /// Relative growth of the volume of bonded soil when it comes loose, 0 to 1.
     pub swell: f64,
+    /// Volume that an area of a body takes up where it touches the material, in m³/m²; 0: nothing sticks to bodies.
+    pub stick: f64,
+    /// Time constant in s with which bodies that have left the ground shed what sticks to them.
+    pub shed: f64,
+    /// Diameter in m of the particles that leave bodies; a quarter of a column if nothing is said.
+    pub grain: Option<f64>,
 }
 
 /// Mobility of a slipping material if nothing else is said, in m²/s.
 const FLOW: f64 = 0.05;
+/// Time constant of shedding if nothing else is said, in s.
+const SHED: f64 = 0.1;
 /// Steepest angle of repose, in degrees. Snow, which stands, has 1.57 rad.
 const STEEPEST: f64 = 89.96;
 /// Difference between the angle at which resting material begins to slip and the angle of repose, in degrees.
@@ -61,11 +69,23 @@ impl Soil {
     /// Angles are in radians here, as the papers print them.
     fn of(repose: f64, inner: f64, push: f64, weight: f64) -> Soil {
         let (repose, inner) = (repose.to_degrees(), inner.to_degrees());
-        Soil { repose, inner, push, rough: 0.0, flow: FLOW, cohesion: 0.0, weight, swell: 0.0 }
+        Soil {
+            repose,
+            inner,
+            push,
+            rough: 0.0,
+            flow: FLOW,
+            cohesion: 0.0,
+            weight,
+            swell: 0.0,
+            stick: 0.0,
+            shed: SHED,
+            grain: None,
+        }
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let Soil { repose, inner, push, rough, flow, cohesion, weight, swell } = *self;
+        let Soil { repose, inner, push, rough, flow, cohesion, weight, swell, stick, shed, grain } = *self;
         check("an angle of repose (°)", repose, repose > 0.1 && repose <= STEEPEST, "0.1 to 89.96")?;
         let steeper = inner >= repose && inner <= STEEPEST;
         check("an inner angle of repose (°)", inner, steeper, "the angle of repose to 89.96")?;
@@ -74,7 +94,11 @@ impl Soil {
         check("a flow (m²/s)", flow, (1e-6..=1e3).contains(&flow), "1e-6 to 1000")?;
         check("a cohesion (kPa)", cohesion, (0.0..=1e4).contains(&cohesion), "0 to 10,000")?;
         check("a weight (kN/m³)", weight, weight > 0.0 && weight <= 1e3, "more than 0, at most 1000")?;
-        check("a swelling", swell, (0.0..=1.0).contains(&swell), "0 to 1")
+        check("a swelling", swell, (0.0..=1.0).contains(&swell), "0 to 1")?;
+        check("what sticks to an area (m)", stick, (0.0..=1.0).contains(&stick), "0 to 1")?;
+        check("a time constant of shedding (s)", shed, (1e-6..=1e6).contains(&shed), "1e-6 to 1e6")?;
+        let grain = grain.unwrap_or(1.0);
+        check("a diameter of particles (m)", grain, (1e-6..=1e3).contains(&grain), "1e-6 to 1000")
     }
 
     /// Tangent of the angle of repose.

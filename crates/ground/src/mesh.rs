@@ -28,6 +28,20 @@ const TOUCHING: i64 = 1 << 30;
 /// Columns around one.
 const AROUND: [(i32, i32); 8] = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
 
+impl Mesh {
+    /// Adds another mesh.
+    pub fn append(&mut self, other: &Mesh) {
+        let first = self.points.len() as u32;
+        if !self.slid.is_empty() || !other.slid.is_empty() {
+            self.slid.resize(self.points.len(), [0.0; 2]);
+            self.slid.extend(&other.slid);
+            self.slid.resize(self.points.len() + other.points.len(), [0.0; 2]);
+        }
+        self.points.extend(&other.points);
+        self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|n| first + n)));
+    }
+}
+
 /// A mesh in the making.
 pub(crate) struct Weaver<'a> {
     ground: &'a Ground,

@@ -84,7 +84,7 @@ impl Ground {
         let cell = self.cell();
         let places: Arc<[Place]> = body.places(part, cell)?.into();
         let before = self.feet.get(&body.id).cloned();
-        if before.as_ref().is_some_and(|foot| foot.places == places && (foot.spanned || !self.poured_on)) {
+        if before.as_ref().is_some_and(|foot| foot.places == places && (foot.spanned || !self.falls)) {
             return Ok(());
         }
         let mut foot = Foot { places, ..Foot::default() };
@@ -94,7 +94,7 @@ impl Ground {
             .map(|foot| foot.map(|foot| (foot, self.highest_under(&foot.places))));
         let highest = ends.iter().flatten().map(|(_, highest)| *highest).fold(i64::MIN, i64::max);
         let is_near = ends.into_iter().flatten().any(|(foot, highest)| foot.comes_below(highest + NEAR));
-        foot.spanned = is_near || self.poured_on || self.carries(body.id);
+        foot.spanned = is_near || self.falls || self.carries(body.id);
         if foot.spanned {
             if body.shelf {
                 // Under the ground it is not there.
@@ -144,7 +144,7 @@ impl Ground {
     }
 
     /// Takes away the bodies that are not in a list.
-    pub(crate) fn keep_bodies(&mut self, bodies: &[Body]) -> Result<(), Error> {
+    pub(crate) fn keep_bodies(&mut self, bodies: &[Body], span: [f64; 2]) -> Result<(), Error> {
         let gone: Vec<u64> =
             self.feet.keys().copied().filter(|id| bodies.iter().all(|body| body.id != *id)).collect();
         for id in gone {
@@ -155,6 +155,7 @@ impl Ground {
             for (column, floor) in loads {
                 self.drop(column, floor.top(), floor.load)?;
             }
+            self.let_go(id, span)?;
         }
         Ok(())
     }
@@ -252,7 +253,7 @@ impl Ground {
     }
 
     /// Lowers a column to a height and returns what was removed; nothing if it is lower, or reaches above by a skin only.
-    fn lower(&mut self, (i, k): (i32, i32), height: i64) -> Result<i64, Error> {
+    pub(crate) fn lower(&mut self, (i, k): (i32, i32), height: i64) -> Result<i64, Error> {
         if self.top(i, k) - height <= SKIN {
             return Ok(0);
         }

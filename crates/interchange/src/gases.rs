@@ -1,4 +1,4 @@
-//! Gases at the frames of an animation, for formats that have points.
+//! Points at the frames of an animation: the blobs of gases, and particles of soil.
 
 use std::sync::Arc;
 
@@ -9,27 +9,30 @@ use dlsys_tree::ModuleString;
 
 use crate::{Error, Options};
 
-/// A gas at all frames.
+/// A gas, or the particles of the ground, at all frames.
 #[derive(Debug)]
 pub(crate) struct GasTrack {
-    pub(crate) name: Arc<str>,
+    /// Its name in files.
+    pub(crate) name: String,
+    /// The name of the gas, if it is one.
+    pub(crate) gas: Option<Arc<str>>,
     pub(crate) color: Color,
     pub(crate) frames: Vec<GasFrame>,
 }
 
-/// The blobs of a gas at a frame.
+/// The blobs of a gas, or particles, at a frame.
 #[derive(Debug)]
 pub(crate) struct GasFrame {
     /// Seconds of the animation.
     pub(crate) seconds: f64,
-    /// The middles of blobs, in metres.
+    /// Their middles, in metres.
     pub(crate) points: Vec<[f32; 3]>,
-    /// Twice their standard deviations, in metres.
+    /// Twice the standard deviations of blobs, and diameters of particles, in metres.
     pub(crate) widths: Vec<f32>,
 }
 
-/// Numbers of a blob.
-const OF_A_BLOB: usize = 4;
+/// Numbers of a point.
+pub(crate) const OF_A_POINT: usize = 4;
 
 /// Follows the gases of a run through the frames at these ascending times.
 ///
@@ -56,9 +59,10 @@ pub(crate) fn follow(
         nursery.draw(&string, &mut scene)?;
         for (number, gas) in scene.gases.iter().enumerate() {
             if tracks.len() == number {
-                tracks.push(GasTrack { name: Arc::clone(&gas.name), color: gas.color, frames: Vec::new() });
+                let (name, gas_name) = (format!("gas.{}", gas.name), Some(Arc::clone(&gas.name)));
+                tracks.push(GasTrack { name, gas: gas_name, color: gas.color, frames: Vec::new() });
             }
-            numbers += OF_A_BLOB * gas.blobs.len();
+            numbers += OF_A_POINT * gas.blobs.len();
             if numbers > options.limits.numbers {
                 return Err(Error::TooLarge { time, limit: options.limits.numbers });
             }

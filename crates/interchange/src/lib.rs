@@ -228,11 +228,13 @@ pub fn grow(
     };
     follower.follow(times, progress)?;
     let mut tracks = follower.tracks;
-    soil::follow(&nursery, (sampler, 0.1 * tolerance), times, options.limits, &mut tracks, progress)?;
-    let gases = match options.gases && dlsys_geometry::turtle::lets_out(model) {
+    let particles =
+        soil::follow(&nursery, (sampler, 0.1 * tolerance), times, options, &mut tracks, progress)?;
+    let mut gases = match options.gases && dlsys_geometry::turtle::lets_out(model) {
         true => gases::follow(session, settings, times, options, progress)?,
         false => Vec::new(),
     };
+    gases.extend(particles);
     let allowed =
         Tolerance { likeness: 0.25 * tolerance, mix: 0.08 * tolerance, mix_of_nets: 0.4 * tolerance };
     let lives = life::lives(&tracks.phases, allowed, 2.0 * instant);

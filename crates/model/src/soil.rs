@@ -29,6 +29,12 @@ pub struct Soil {
     pub weight: Option<f64>,
     /// The part by which loosened soil expands.
     pub swell: Option<f64>,
+    /// What an area of a body takes up where it touches the soil, in m.
+    pub stick: Option<f64>,
+    /// The time constant with which bodies shed what sticks to them, in s.
+    pub shed: Option<f64>,
+    /// The diameter of the particles that leave them, in m.
+    pub grain: Option<f64>,
     /// Its colour.
     pub color: Rgb,
     /// The place of the declaration in the text.

@@ -42,6 +42,7 @@ use dlsys_diagnostic::{Diagnostic, Source};
 use dlsys_model::{Measure, Model};
 use dlsys_sim::{self as sim, Simulation};
 use dlsys_surround::Place;
+pub use dlsys_surround::Quilt;
 
 /// A model that has been read and checked, with its text.
 #[derive(Clone, Debug)]

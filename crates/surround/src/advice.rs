@@ -113,6 +113,10 @@ pub(crate) fn on_ground(error: &ground::Error) -> (&'static str, &'static str) {
             "declared here",
             "a larger `cell` needs less memory, and so does a smaller place that is touched or poured on",
         ),
+        ground::Error::Particles { .. } => (
+            "declared here",
+            "`grain D` in its soil is the diameter of the particles in m; less that sticks (`stick`), or is shed faster (`shed`), are fewer at a time",
+        ),
         ground::Error::Value { name, .. } if name.contains("sweeps") => {
             ("declared here", "a larger `cell` needs fewer of them, and so does a smaller `flow` of the soil")
         }

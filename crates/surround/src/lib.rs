@@ -52,6 +52,7 @@ mod quilt;
 mod reading;
 mod sheets;
 mod solids;
+mod spray;
 mod survey;
 mod terrain;
 mod tracks;

@@ -1,4 +1,4 @@
-//! Ground that gives way in pieces whose triangles stay the same while their points move, for files that animate points.
+//! Ground that gives way in pieces whose triangles stay the same while their points move, and its particles one by one, for files that animate points.
 
 use std::sync::{Arc, PoisonError};
 
@@ -8,17 +8,34 @@ use dlsys_tree::Lineage;
 
 use crate::Error;
 use crate::motion::Motion;
+use crate::spray::with_spray;
 use crate::terrain::{TICKS, Terrain, from_metres};
 
 /// The name of ground in files.
 const NAME: &str = "ground";
 /// The number of productions that stands for none: the lineages of pieces are no others.
 const NO_PRODUCTION: u64 = u64::MAX;
+/// The same for particles.
+const PARTICLE: u64 = u64::MAX - 1;
 
 /// The pieces of a ground, with their meshes at the time at which they were made.
 pub struct Quilt {
     pieces: Vec<(ground::Piece, Arc<scene::Mesh>)>,
     material: MaterialId,
+    /// A particle of the volume 1.
+    particle: Arc<scene::Mesh>,
+}
+
+impl Quilt {
+    /// The material of the ground.
+    pub fn material(&self) -> MaterialId {
+        self.material
+    }
+
+    /// Whether a surface is a particle: an octahedron of the volume 1, at its place and scale.
+    pub fn is_particle(&self, surface: &Surface) -> bool {
+        Arc::ptr_eq(&surface.mesh, &self.particle)
+    }
 }
 
 impl<'m> Terrain<'m> {
@@ -54,10 +71,13 @@ impl<'m> Terrain<'m> {
             };
             (piece, Arc::new(mesh))
         };
-        Ok(Quilt { pieces: moment.ground.pieces().into_iter().map(with_mesh).collect(), material })
+        let octahedron = ground::Mesh::octahedron(ground::Vector::zeros(), 1.0);
+        let particle = Arc::new(with_spray(ground::Mesh::default(), &octahedron, (1.0, None), material));
+        let pieces = moment.ground.pieces().into_iter().map(with_mesh).collect();
+        Ok(Quilt { pieces, material, particle })
     }
 
-    /// Adds the pieces at a time of the model to a scene, and what lies on bodies.
+    /// Adds the pieces at a time of the model to a scene, what lies on bodies, and each particle.
     ///
     /// # Errors
     /// As of [`Terrain::at`].
@@ -90,9 +110,16 @@ impl<'m> Terrain<'m> {
         }
         let heaps = moment.ground.heaps();
         if !heaps.triangles.is_empty() {
-            let triangles = heaps.triangles.iter().map(|corners| (*corners, quilt.material));
-            let mesh = scene::Mesh::of_triangles(from_metres(&heaps.points, metre), &[], triangles);
-            add(0, Arc::new(mesh), None);
+            let none = ground::Mesh::default();
+            add(0, Arc::new(with_spray(heaps, &none, (metre, None), quilt.material)), None);
+        }
+        for ground::Flight { id, place, volume } in moment.ground.flights(self.place.seconds(time)) {
+            let lineage = Lineage::of_axiom(0).child(PARTICLE, id as usize);
+            let owner = scene.add_owner(Owner { name: NAME.into(), lineage });
+            let axes = [Vector::x(), Vector::y(), Vector::z()];
+            let placement = Placement::uniform(Point::from(place / metre), axes, volume.cbrt() / metre);
+            let mesh = Arc::clone(&quilt.particle);
+            scene.surfaces.push(Surface { mesh, patches: None, rest: None, placement, tint: None, owner });
         }
         Ok(())
     }

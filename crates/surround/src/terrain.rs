@@ -30,6 +30,7 @@ use crate::picture::Picture;
 use crate::place::Place;
 use crate::pressing::{Placed, placed};
 use crate::reading;
+use crate::spray::with_spray;
 
 /// Ticks of the ground in a second.
 pub const TICKS: f64 = 120.0;
@@ -98,8 +99,8 @@ pub(crate) struct State<'m> {
     marks: Marks<Course<'m>>,
     spent: Duration,
     scene: Scene,
-    /// The last mesh, and its tick.
-    mesh: Option<(u64, MaterialId, Arc<scene::Mesh>)>,
+    /// The last mesh, with its tick, the bits of its time if something is in the air, and its material.
+    mesh: Option<((u64, u64, MaterialId), Arc<scene::Mesh>)>,
 }
 
 /// What the columns of a ground are doing at a time.
@@ -113,10 +114,16 @@ pub struct TerrainReport {
     pub sweeps: u64,
     /// See `sweeps`.
     pub updates: u64,
-    /// What columns, loads and what is compressed have gained less what was poured, in parts of quanta: always 0.
+    /// What columns, loads, particles, what sticks to bodies and what is compressed have gained less what was poured, in parts of quanta: always 0.
     pub imbalance: i128,
     /// Volume that lies on bodies, in m³.
     pub carried: f64,
+    /// Volume that sticks to them, and volume in the air, in m³.
+    pub sticking: f64,
+    /// See `sticking`.
+    pub airborne: f64,
+    /// Number of particles in the air.
+    pub particles: usize,
     /// Nothing slips.
     pub is_at_rest: bool,
 }
@@ -157,7 +164,7 @@ impl<'m> Terrain<'m> {
         Ok(Some(Terrain { model, settings, place, has_bodies, picture, layers, state: Mutex::new(state) }))
     }
 
-    /// The surface of the ground, and of what lies on bodies, at a time of the model, in its units, of a material. Stems move as they do here.
+    /// The surface of the ground and of what lies on bodies, and the particles in the air, at a time of the model, in its units, of a material. Stems move as they do here.
     ///
     /// # Errors
     /// The growth up to that time fails, or the motion of its stems; a body or what is poured is not possible, or there is too much of it.
@@ -169,13 +176,15 @@ impl<'m> Terrain<'m> {
     ) -> Result<Arc<scene::Mesh>, Error> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let moment = self.reach(&mut state, time, motion)?;
-        if let Some((number, of, mesh)) = &state.mesh
-            && (*number, *of) == (moment.number, material)
+        let (seconds, still) = (self.place.seconds(time), moment.ground.particles() == 0);
+        let of = (moment.number, if still { 0 } else { seconds.to_bits() }, material);
+        if let Some((known, mesh)) = &state.mesh
+            && *known == of
         {
             return Ok(Arc::clone(mesh));
         }
-        let mesh = Arc::new(self.mesh(&moment.ground, material));
-        state.mesh = Some((moment.number, material, Arc::clone(&mesh)));
+        let mesh = Arc::new(self.mesh(&moment.ground, seconds, material));
+        state.mesh = Some((of, Arc::clone(&mesh)));
         Ok(mesh)
     }
 
@@ -204,6 +213,9 @@ impl<'m> Terrain<'m> {
             updates: ground.updates(),
             imbalance: ground.imbalance(),
             carried: ground.carried(),
+            sticking: ground.sticking(),
+            airborne: ground.airborne(),
+            particles: ground.particles(),
             is_at_rest: ground.is_at_rest(),
         })
     }
@@ -299,7 +311,10 @@ impl<'m> Terrain<'m> {
                 break;
             }
             self.tick(&mut present, state, motion)?;
-            state.marks.set(present.moment.number, &present, |course| course.moment.ground.stored());
+            state.marks.set(present.moment.number, &present, |course| {
+                let ground = &course.moment.ground;
+                ground.stored() + ground.particles()
+            });
         }
         let moment = present.moment.clone();
         state.present = Some(present);
@@ -308,6 +323,7 @@ impl<'m> Terrain<'m> {
             Some(before) => moment.ground.changed_since(&before.ground).len() * 32 * 32,
             None => moment.ground.stored(),
         };
+        let own = own + moment.ground.particles();
         state.kept.add(number, moment.clone(), own + 1);
         Ok(moment)
     }
@@ -468,19 +484,12 @@ impl<'m> Terrain<'m> {
         Ok(pours)
     }
 
-    /// The surface in units of the model.
-    fn mesh(&self, ground: &Ground, material: MaterialId) -> scene::Mesh {
+    /// The surface, and what is in the air at a time in s, in units of the model.
+    fn mesh(&self, ground: &Ground, seconds: f64, material: MaterialId) -> scene::Mesh {
         let metre = self.place.units.length;
-        let (mut surface, heaps) = (ground.mesh(), ground.heaps());
-        let first = surface.points.len() as u32;
-        surface.points.extend(heaps.points);
-        surface.triangles.extend(heaps.triangles.iter().map(|corners| corners.map(|n| first + n)));
-        let triangles = surface.triangles.iter().map(|corners| (*corners, material));
-        let mesh = scene::Mesh::of_triangles(from_metres(&surface.points, metre), &[], triangles);
-        match self.picture {
-            Some(picture) => picture.put_on(mesh, &surface.points, &surface.slid),
-            None => mesh,
-        }
+        let mut surface = ground.mesh();
+        surface.append(&ground.heaps());
+        with_spray(surface, &ground.spray(seconds), (metre, self.picture), material)
     }
 
     /// The time of the model at a tick.
@@ -600,5 +609,8 @@ fn material(soil: &Soil) -> ground::Soil {
         cohesion: soil.cohesion.unwrap_or(base.cohesion),
         weight: soil.weight.unwrap_or(base.weight),
         swell: soil.swell.unwrap_or(base.swell),
+        stick: soil.stick.unwrap_or(base.stick),
+        shed: soil.shed.unwrap_or(base.shed),
+        grain: soil.grain,
     }
 }

@@ -22,6 +22,14 @@ pub fn part(model: &Model) -> Option<ScenePart> {
     if !shelves.is_empty() {
         reasons.push(format!("{} carry what falls", shelves.join(", ")));
     }
+    let soil = &scenery.soils[bed.soil];
+    if let Some(stick) = soil.stick.filter(|stick| *stick > 0.0 && !solids.is_empty()) {
+        let shed = soil.shed.map_or(String::new(), |shed| format!(" within {} s", brief(shed, 3)));
+        reasons.push(format!(
+            "they take up {} mm of it where they touch it, and shed it as particles{shed}",
+            brief(1000.0 * stick, 3)
+        ));
+    }
     match scenery.pours.len() {
         0 => (),
         1 => reasons.push("`pour` adds to it".to_owned()),

@@ -11,6 +11,7 @@ mod rules;
 mod scenes;
 mod shelves;
 mod speed;
+mod throws;
 mod vessels;
 
 pub use banks::{Bank, bank};
@@ -20,6 +21,7 @@ pub use rules::{RuleRow, repose, rules};
 pub use scenes::{footprints, posts, runner, sandbox, torus};
 pub use shelves::{bucket, disc, square};
 pub use speed::{Speed, speeds};
+pub use throws::{flight, shed};
 pub use vessels::{scoop, tip, vessel};
 
 /// A case: computes its rows.
@@ -29,8 +31,10 @@ pub type Case = fn() -> Result<Vec<Convergence>, Error>;
 pub const SLOW_CASE: Case = cone_on_incline;
 
 /// The other exact cases.
-pub const EXACT_CASES: [Case; 13] =
-    [cylinder, dam, strip, cone, portions, round, disc, square, bucket, bank, sphere_rim, scoop, tip];
+pub const EXACT_CASES: [Case; 15] = [
+    cylinder, dam, strip, cone, portions, round, disc, square, bucket, bank, sphere_rim, scoop, tip, shed,
+    flight,
+];
 
 /// Most sweeps until a heap rests.
 const SWEEPS: u64 = 200_000;

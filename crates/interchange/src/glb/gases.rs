@@ -1,6 +1,6 @@
-//! Gases as points: a mesh of points for each frame, which is seen until the next one.
+//! Gases, and particles of soil, as points: a mesh of points for each frame, which is seen until the next one.
 //!
-//! The number of blobs changes from frame to frame, and a track of a glTF file moves what is there. So nothing is between two frames; in USDA files, too.
+//! Their number changes from frame to frame, and a track of a glTF file moves what is there. So nothing is between two frames; in USDA files, too.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::gases::GasTrack;
 use crate::linear;
 use crate::motion::APART;
 
-/// The attribute with the widths of points in metres: two standard deviations of the blobs.
+/// The attribute with the widths of points in metres: two standard deviations of blobs, diameters of particles.
 const WIDTH: &str = "_WIDTH";
 
 impl Writer<'_> {
@@ -21,7 +21,7 @@ impl Writer<'_> {
     pub(super) fn gases(&mut self, animation: &mut Animation) {
         let growth = self.growth;
         for gas in &growth.gases {
-            let name = format!("gas.{}", gas.name);
+            let name = gas.name.clone();
             let material = self.document.materials.len();
             let pbr = Pbr::of(linear(gas.color));
             let look = Material { name: name.clone(), pbr, double_sided: true, alpha_mode: None };
@@ -29,7 +29,7 @@ impl Writer<'_> {
             let children = self.frames(gas, material, animation);
             let number = self.document.nodes.len();
             self.document.nodes[0].children.push(number);
-            let extras = Some(json!({ "gas": &*gas.name }));
+            let extras = gas.gas.as_ref().map(|name| json!({ "gas": &**name }));
             self.document.nodes.push(Node { name, children, extras, ..Node::default() });
         }
     }
@@ -46,7 +46,7 @@ impl Writer<'_> {
             ]);
             let points =
                 Primitive { attributes, indices: None, material, mode: Some(POINTS), targets: Vec::new() };
-            let name = format!("gas.{}.{number}", gas.name);
+            let name = format!("{}.{number}", gas.name);
             let mesh = Some(self.document.meshes.len());
             self.document.meshes.push(Mesh { name: name.clone(), primitives: vec![points] });
             let node = self.document.nodes.len();

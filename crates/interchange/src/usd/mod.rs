@@ -334,11 +334,11 @@ impl Writer<'_> {
         self.mesh(text, "ground", None, (&primitive, None));
     }
 
-    /// Gases as points with widths, at the frames. Their number changes, so programs show each frame until the next.
+    /// Gases and particles as points with widths, at the frames. Their number changes, so programs show each frame until the next.
     fn gases(&self, text: &mut Text) {
         let mut names = Identifiers::default();
         for gas in &self.growth.gases {
-            let name = names.choose(&format!("gas_{}", gas.name));
+            let name = names.choose(&gas.name.replace('.', "_"));
             text.block(&format!("def Points \"{name}\" "), BRACES, |text| {
                 let frames = || gas.frames.iter().map(|frame| (frame.seconds * RATE, frame));
                 text.samples("float3[] extent", frames(), |out, frame| {

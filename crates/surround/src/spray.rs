@@ -1,0 +1,37 @@
+//! The surface of ground of soil and its particles as meshes in units of the model.
+
+use dlsys_geometry::scene::{self, MaterialId};
+use dlsys_ground as ground;
+
+use crate::picture::Picture;
+use crate::terrain::from_metres;
+
+/// Of the normal of a particle that does not point up.
+const OWN: f64 = 0.4;
+
+/// A mesh in m and particles as one mesh of a material, where a unit of the model is so many metres, and under a picture if there is one. Normals of particles are turned
+/// up by more than a half, so that they are as light as the ground is.
+pub(crate) fn with_spray(
+    mut mesh: ground::Mesh,
+    spray: &ground::Mesh,
+    (metre, picture): (f64, Option<Picture>),
+    material: MaterialId,
+) -> scene::Mesh {
+    let mut normals = Vec::new();
+    if !spray.points.is_empty() {
+        normals.resize(mesh.points.len(), ground::Vector::zeros());
+        // Opposite corners are in pairs.
+        let octahedra = spray.points.chunks_exact(2).flat_map(|pair| {
+            let axis = (pair[0] - pair[1]).normalize() * OWN;
+            [ground::Vector::y() + axis, ground::Vector::y() - axis]
+        });
+        normals.extend(octahedra);
+    }
+    mesh.append(spray);
+    let triangles = mesh.triangles.iter().map(|corners| (*corners, material));
+    let made = scene::Mesh::of_triangles(from_metres(&mesh.points, metre), &normals, triangles);
+    match picture {
+        Some(picture) => picture.put_on(made, &mesh.points, &mesh.slid),
+        None => made,
+    }
+}
