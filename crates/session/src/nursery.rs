@@ -22,7 +22,8 @@ use dlsys_geometry::turtle::{self, Strains};
 use dlsys_model::{self as model, Model};
 use dlsys_sim::{self as sim, Settings, Simulation, brief};
 use dlsys_surround::{
-    self as surround, Classes, Gases, Motion, Passive as Following, Place, Quilt, Sheets, Terrain, Weather,
+    self as surround, Classes, Earth, Gases, Motion, Passive as Following, Place, Quilt, Sheets, Terrain,
+    Weather,
 };
 use dlsys_tree::ModuleString;
 
@@ -104,7 +105,7 @@ pub struct Nursery<'m> {
     /// Ground that gives way is drawn by [`Nursery::draw_quilt`] only.
     is_in_pieces: bool,
     /// The material of ground that gives way.
-    earth: MaterialId,
+    earth: Earth,
 }
 
 /// What is passive in a scene.
@@ -123,9 +124,13 @@ impl<'m> Nursery<'m> {
         let mut nursery = Nursery::with_blanks(model, settings, &mut turtle::blanks(model).into_iter());
         if let Some(bed) = &model.scenery.bed {
             let color = Color::hex(model.scenery.soils[bed.soil].color);
+            let palette = &mut nursery.blank.palette;
             nursery.earth = match &bed.texture {
-                Some(texture) => nursery.blank.palette.add_textured("ground", texture),
-                None => nursery.blank.palette.add("ground", color),
+                Some(texture) => {
+                    let surface = palette.add_textured("ground", texture);
+                    Earth { surface, loose: palette.add("ground", color) }
+                }
+                None => palette.add("ground", color).into(),
             };
         }
         nursery
@@ -154,7 +159,7 @@ impl<'m> Nursery<'m> {
             has_gases: true,
             has_ground: true,
             is_in_pieces: false,
-            earth: MaterialId::LEAF,
+            earth: MaterialId::LEAF.into(),
         }
     }
 

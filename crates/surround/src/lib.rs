@@ -67,6 +67,7 @@ pub use gases::{Gases, MOST_BLOBS, TICK as GAS_TICK};
 pub use hanging::TICK as SHEET_TICK;
 pub use loose::Loose;
 pub use motion::{MOST_TICKS, Motion, Passive};
+pub use picture::Earth;
 pub use place::Place;
 pub use quilt::Quilt;
 pub use reading::bind;

@@ -1,8 +1,23 @@
 //! The picture on ground of soil: where each point of the surface lies in it, and how it slides with the material.
 
-use dlsys_geometry::scene::Mesh;
+use dlsys_geometry::scene::{MaterialId, Mesh};
 use dlsys_ground as ground;
 use dlsys_model::Bed;
+
+/// The materials of a ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Earth {
+    /// That of its surface, perhaps with a picture.
+    pub surface: MaterialId,
+    /// That of what lies on bodies or flies: a picture would not move with it.
+    pub loose: MaterialId,
+}
+
+impl From<MaterialId> for Earth {
+    fn from(material: MaterialId) -> Earth {
+        Earth { surface: material, loose: material }
+    }
+}
 
 /// The picture that a ground has, in SI.
 #[derive(Clone, Copy, Debug)]

@@ -8,6 +8,7 @@ use dlsys_tree::Lineage;
 
 use crate::Error;
 use crate::motion::Motion;
+use crate::picture::Earth;
 use crate::spray::with_spray;
 use crate::terrain::{TICKS, Terrain, from_metres};
 
@@ -21,7 +22,7 @@ const PARTICLE: u64 = u64::MAX - 1;
 /// The pieces of a ground, with their meshes at the time at which they were made.
 pub struct Quilt {
     pieces: Vec<(ground::Piece, Arc<scene::Mesh>)>,
-    material: MaterialId,
+    earth: Earth,
     /// A particle of the volume 1.
     particle: Arc<scene::Mesh>,
 }
@@ -29,7 +30,7 @@ pub struct Quilt {
 impl Quilt {
     /// The material of the ground.
     pub fn material(&self) -> MaterialId {
-        self.material
+        self.earth.surface
     }
 
     /// Whether a surface is a particle: an octahedron of the volume 1, at its place and scale.
@@ -54,15 +55,16 @@ impl<'m> Terrain<'m> {
     pub fn quilt(
         &self,
         until: f64,
-        material: MaterialId,
+        earth: impl Into<Earth>,
         motion: Option<&Motion<'m>>,
     ) -> Result<Quilt, Error> {
+        let earth = earth.into();
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let moment = self.reach(&mut state, until, motion)?;
         let metre = self.place.units.length;
         let with_mesh = |piece: ground::Piece| {
             let points = moment.ground.points(&piece);
-            let triangles = piece.triangles.iter().map(|corners| (*corners, material));
+            let triangles = piece.triangles.iter().map(|corners| (*corners, earth.surface));
             let mesh = scene::Mesh::of_triangles(from_metres(&points, metre), &[], triangles);
             // Where points move, their places in the picture stay: no program that plays such a file moves them.
             let mesh = match self.picture {
@@ -72,9 +74,10 @@ impl<'m> Terrain<'m> {
             (piece, Arc::new(mesh))
         };
         let octahedron = ground::Mesh::octahedron(ground::Vector::zeros(), 1.0);
-        let particle = Arc::new(with_spray(ground::Mesh::default(), &octahedron, (1.0, None), material));
+        let particle =
+            Arc::new(with_spray(ground::Mesh::default(), &octahedron, (1.0, None), earth.loose.into()));
         let pieces = moment.ground.pieces().into_iter().map(with_mesh).collect();
-        Ok(Quilt { pieces, material, particle })
+        Ok(Quilt { pieces, earth, particle })
     }
 
     /// Adds the pieces at a time of the model to a scene, what lies on bodies, and each particle.
@@ -111,7 +114,7 @@ impl<'m> Terrain<'m> {
         let heaps = moment.ground.heaps();
         if !heaps.triangles.is_empty() {
             let none = ground::Mesh::default();
-            add(0, Arc::new(with_spray(heaps, &none, (metre, None), quilt.material)), None);
+            add(0, Arc::new(with_spray(heaps, &none, (metre, None), quilt.earth.loose.into())), None);
         }
         for ground::Flight { id, place, volume } in moment.ground.flights(self.place.seconds(time)) {
             let lineage = Lineage::of_axiom(0).child(PARTICLE, id as usize);

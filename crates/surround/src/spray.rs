@@ -1,9 +1,9 @@
 //! The surface of ground of soil and its particles as meshes in units of the model.
 
-use dlsys_geometry::scene::{self, MaterialId};
+use dlsys_geometry::scene;
 use dlsys_ground as ground;
 
-use crate::picture::Picture;
+use crate::picture::{Earth, Picture};
 use crate::terrain::from_metres;
 
 /// Of the normal of a particle that does not point up.
@@ -15,7 +15,7 @@ pub(crate) fn with_spray(
     mut mesh: ground::Mesh,
     spray: &ground::Mesh,
     (metre, picture): (f64, Option<Picture>),
-    material: MaterialId,
+    earth: Earth,
 ) -> scene::Mesh {
     let mut normals = Vec::new();
     if !spray.points.is_empty() {
@@ -28,7 +28,12 @@ pub(crate) fn with_spray(
         normals.extend(octahedra);
     }
     mesh.append(spray);
-    let triangles = mesh.triangles.iter().map(|corners| (*corners, material));
+    let material = |corners: &[u32; 3]| {
+        // Where there is a picture, the first points are those of the surface.
+        let is_loose = picture.is_some() && corners[0] as usize >= mesh.slid.len();
+        if is_loose { earth.loose } else { earth.surface }
+    };
+    let triangles = mesh.triangles.iter().map(|corners| (*corners, material(corners)));
     let made = scene::Mesh::of_triangles(from_metres(&mesh.points, metre), &normals, triangles);
     match picture {
         Some(picture) => picture.put_on(made, &mesh.points, &mesh.slid),

@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use dlsys_diagnostic::Span;
-use dlsys_geometry::scene::{self, MaterialId, Point, Scene};
+use dlsys_geometry::scene::{self, Point, Scene};
 use dlsys_geometry::turtle;
 use dlsys_ground::{self as ground, Description, Extent, Ground};
 use dlsys_model::{Bed, Model, Soil, SoilBase};
@@ -26,7 +26,7 @@ use crate::descent::Descent;
 use crate::layers::{Layer, Layers};
 use crate::marks::{Marks, Recent};
 use crate::motion::{MOST_TICKS, Motion};
-use crate::picture::Picture;
+use crate::picture::{Earth, Picture};
 use crate::place::Place;
 use crate::pressing::{Placed, placed};
 use crate::reading;
@@ -100,7 +100,7 @@ pub(crate) struct State<'m> {
     spent: Duration,
     scene: Scene,
     /// The last mesh, with its tick, the bits of its time if something is in the air, and its material.
-    mesh: Option<((u64, u64, MaterialId), Arc<scene::Mesh>)>,
+    mesh: Option<((u64, u64, Earth), Arc<scene::Mesh>)>,
 }
 
 /// What the columns of a ground are doing at a time.
@@ -171,19 +171,20 @@ impl<'m> Terrain<'m> {
     pub fn at(
         &self,
         time: f64,
-        material: MaterialId,
+        earth: impl Into<Earth>,
         motion: Option<&Motion<'m>>,
     ) -> Result<Arc<scene::Mesh>, Error> {
+        let earth = earth.into();
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let moment = self.reach(&mut state, time, motion)?;
         let (seconds, still) = (self.place.seconds(time), moment.ground.particles() == 0);
-        let of = (moment.number, if still { 0 } else { seconds.to_bits() }, material);
+        let of = (moment.number, if still { 0 } else { seconds.to_bits() }, earth);
         if let Some((known, mesh)) = &state.mesh
             && *known == of
         {
             return Ok(Arc::clone(mesh));
         }
-        let mesh = Arc::new(self.mesh(&moment.ground, seconds, material));
+        let mesh = Arc::new(self.mesh(&moment.ground, seconds, earth));
         state.mesh = Some((of, Arc::clone(&mesh)));
         Ok(mesh)
     }
@@ -485,11 +486,11 @@ impl<'m> Terrain<'m> {
     }
 
     /// The surface, and what is in the air at a time in s, in units of the model.
-    fn mesh(&self, ground: &Ground, seconds: f64, material: MaterialId) -> scene::Mesh {
+    fn mesh(&self, ground: &Ground, seconds: f64, earth: Earth) -> scene::Mesh {
         let metre = self.place.units.length;
         let mut surface = ground.mesh();
         surface.append(&ground.heaps());
-        with_spray(surface, &ground.spray(seconds), (metre, self.picture), material)
+        with_spray(surface, &ground.spray(seconds), (metre, self.picture), earth)
     }
 
     /// The time of the model at a tick.
