@@ -9,6 +9,7 @@ use dlsys_geometry::scene::Scene;
 use dlsys_geometry::turtle::{self, Origin, Passive};
 use dlsys_model::Model;
 use dlsys_sheet::{Attitude, Place as Stand, Shape, Vector};
+use dlsys_solid::Path as Course;
 use dlsys_tree::ModuleString;
 
 use crate::Error;
@@ -18,35 +19,9 @@ use crate::points::{Pair, rigid_motion};
 use crate::solids::{MOST_BODIES, corners, rounded};
 
 /// The instants of a tick, or of a part of one, at which solids are drawn, in parts of it.
-pub(crate) const INSTANTS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
+pub(crate) const INSTANTS: [f64; 4] = Course::INSTANTS;
 /// Most iterations to find a rotation, each of which squares the error.
 const ITERATIONS: usize = 8;
-
-/// A polynomial through values at [`INSTANTS`], over the parts of a tick.
-#[derive(Clone, Copy, Debug, Default)]
-struct Cubic([Vector; 4]);
-
-impl Cubic {
-    fn through(values: [Vector; 4]) -> Cubic {
-        let [a, b, c, d] = values;
-        // What stands is exactly at rest.
-        let [b, c, d] = [b - a, c - a, d - a];
-        let first = (b * 18.0 - c * 9.0 + d * 2.0) / 2.0;
-        let second = (c * 36.0 - b * 45.0 - d * 9.0) / 2.0;
-        let third = (b * 27.0 - c * 27.0 + d * 9.0) / 2.0;
-        Cubic([a, first, second, third])
-    }
-
-    fn value(&self, part: f64) -> Vector {
-        let [a, b, c, d] = self.0;
-        a + (b + (c + d * part) * part) * part
-    }
-
-    fn slope(&self, part: f64) -> Vector {
-        let [_, b, c, d] = self.0;
-        b + (c * 2.0 + d * (3.0 * part)) * part
-    }
-}
 
 /// A solid on its way through a tick.
 #[derive(Clone, Debug)]
@@ -54,31 +29,18 @@ pub(crate) struct Path {
     /// The module that draws it where the path begins.
     pub(crate) origin: Origin,
     pub(crate) shape: Shape,
-    /// Where the tick begins, and its length, in s.
-    begin: f64,
-    length: f64,
-    centre: Cubic,
-    /// The rotation vector since the beginning of the tick.
-    turn: Cubic,
+    course: Course,
 }
 
 impl Path {
     /// Adds ways at the instants, in m.
     pub(crate) fn deviate(&mut self, ways: [Vector; 4]) {
-        let more = Cubic::through(ways);
-        self.centre.0.iter_mut().zip(more.0).for_each(|(here, more)| *here += more);
+        self.course.deviate(ways);
     }
 
     /// Where it is at a time in s.
     pub(crate) fn place(&self, time: f64) -> Stand {
-        let part = (time - self.begin) / self.length;
-        let (turn, rate) = (self.turn.value(part), self.turn.slope(part) / self.length);
-        Stand {
-            position: self.centre.value(part),
-            attitude: Attitude::from_scaled_axis(turn),
-            velocity: self.centre.slope(part) / self.length,
-            spin: rate + turn.cross(&rate) / 2.0,
-        }
+        self.course.place(time)
     }
 }
 
@@ -217,8 +179,8 @@ fn path(first: &Drawn, later: &[Option<Vec<Vector>>; 3], (begin, length): (f64, 
             turns[k + 1] = rotation(&pairs, [middle, centres[k + 1]], turns[k]);
         }
     }
-    let (centre, turn) = (Cubic::through(centres), Cubic::through(turns));
-    Some(Path { origin: first.origin, shape, begin, length, centre, turn })
+    let course = Course::through((begin, length), centres, turns);
+    Some(Path { origin: first.origin, shape, course })
 }
 
 /// The rotation vector that leads from places about one centre to places about another, as near as that is possible. `guess` is one for an instant before.
