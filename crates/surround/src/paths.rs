@@ -23,6 +23,28 @@ pub(crate) const INSTANTS: [f64; 4] = Course::INSTANTS;
 /// Most iterations to find a rotation, each of which squares the error.
 const ITERATIONS: usize = 8;
 
+/// What meets solids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Meets {
+    /// The wind, which they push.
+    Wind,
+    /// Sheets.
+    Sheets,
+    /// What is let go.
+    Falling,
+}
+
+impl Meets {
+    /// What bodies do with it.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Meets::Wind => "push the wind",
+            Meets::Sheets => "meet sheets",
+            Meets::Falling => "be in the way of what falls",
+        }
+    }
+}
+
 /// A solid on its way through a tick.
 #[derive(Clone, Debug)]
 pub(crate) struct Path {
@@ -42,6 +64,16 @@ impl Path {
     pub(crate) fn place(&self, time: f64) -> Stand {
         self.course.place(time)
     }
+}
+
+/// A solid through a tick, as what falls meets it.
+pub(crate) struct Body {
+    /// The module that draws it where the tick begins.
+    pub(crate) module: u64,
+    /// The diagonal of the box around it, in m.
+    pub(crate) diagonal: f64,
+    pub(crate) parts: Vec<Shape>,
+    pub(crate) path: Course,
 }
 
 /// A solid as it is drawn at an instant, in m.
@@ -78,7 +110,7 @@ impl Watch {
         &mut self,
         (instant, string): (usize, &ModuleString),
         (model, place): (&Model, &Place),
-        descent: &Descent,
+        (descent, meets): (&Descent, Meets),
         scene: &mut Scene,
     ) -> Result<(), Error> {
         let is_solid =
@@ -97,7 +129,7 @@ impl Watch {
             };
             if let Some(passive) = solid.passive {
                 let kind = model.kinds.get(solid.origin.kind).name.clone();
-                let (falls, meets) = (passive == Passive::Falls, true);
+                let falls = passive == Passive::Falls;
                 let lineage = solid.origin.lineage;
                 return Err(Error::PassiveSolid {
                     kind,
@@ -109,7 +141,12 @@ impl Watch {
                 });
             }
             if drawn.len() == MOST_BODIES {
-                return Err(Error::TooManySolids { most: MOST_BODIES, time: string.time, span: span() });
+                return Err(Error::TooManySolids {
+                    most: MOST_BODIES,
+                    time: string.time,
+                    meets,
+                    span: span(),
+                });
             }
             let metre = place.units.length;
             let ball = |(point, radius): &(dlsys_geometry::scene::Point, f64)| {
@@ -154,6 +191,17 @@ impl Watch {
         way > most
     }
 
+    /// The solids of a tick as what falls meets them: sharp where they are drawn so.
+    pub(crate) fn bodies(&self, begin: f64, length: f64) -> Vec<Body> {
+        let body = |(first, later): (&Drawn, &[Option<Vec<Vector>>; 3])| {
+            let (balls, middle, path) = course(first, later, (begin, length));
+            let about: Vec<_> = balls.iter().map(|(point, radius)| (point - middle, *radius)).collect();
+            let parts = dlsys_solid::parts(&about).ok()?;
+            Some(Body { module: first.origin.lineage.id, diagonal: first.diagonal(), parts, path })
+        };
+        self.first.iter().zip(&self.later).filter_map(body).collect()
+    }
+
     /// The ways of all solids through a tick that begins at a time and has a length, in s. What is not drawn at an instant stays where it was before.
     pub(crate) fn paths(&self, begin: f64, length: f64) -> Vec<Path> {
         self.first
@@ -164,12 +212,22 @@ impl Watch {
     }
 }
 
-fn path(first: &Drawn, later: &[Option<Vec<Vector>>; 3], (begin, length): (f64, f64)) -> Option<Path> {
+fn path(first: &Drawn, later: &[Option<Vec<Vector>>; 3], span: (f64, f64)) -> Option<Path> {
+    let (balls, middle, course) = course(first, later, span);
+    let (points, radius) = rounded(&balls);
+    let shape = Shape::rounded(points.iter().map(|point| point - middle).collect(), radius).ok()?;
+    Some(Path { origin: first.origin, shape, course })
+}
+
+/// The balls of a drawing that are corners, the middle of them, and its way.
+fn course(
+    first: &Drawn,
+    later: &[Option<Vec<Vector>>; 3],
+    span: (f64, f64),
+) -> (Vec<(Vector, f64)>, Vector, Course) {
     let chosen = corners(&first.balls);
     let balls: Vec<(Vector, f64)> = chosen.iter().map(|i| first.balls[*i]).collect();
     let middle = balls.iter().map(|(point, _)| point).sum::<Vector>() / balls.len().max(1) as f64;
-    let (points, radius) = rounded(&balls);
-    let shape = Shape::rounded(points.iter().map(|point| point - middle).collect(), radius).ok()?;
     let (mut centres, mut turns) = ([middle; 4], [Vector::zeros(); 4]);
     for k in 0..3 {
         (centres[k + 1], turns[k + 1]) = (centres[k], turns[k]);
@@ -179,8 +237,7 @@ fn path(first: &Drawn, later: &[Option<Vec<Vector>>; 3], (begin, length): (f64, 
             turns[k + 1] = rotation(&pairs, [middle, centres[k + 1]], turns[k]);
         }
     }
-    let course = Course::through((begin, length), centres, turns);
-    Some(Path { origin: first.origin, shape, course })
+    (balls, middle, Course::through(span, centres, turns))
 }
 
 /// The rotation vector that leads from places about one centre to places about another, as near as that is possible. `guess` is one for an instant before.
