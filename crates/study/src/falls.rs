@@ -89,8 +89,7 @@ impl Contacts {
 
     /// Number of bodies that passed through a solid, came too deep into it, or gained energy.
     pub fn failed(&self) -> usize {
-        let bad =
-            |end: &&RandomContact| end.pierced || end.depth > MOST_DEPTH || end.gain > MOST_GAIN;
+        let bad = |end: &&RandomContact| end.pierced || end.depth > MOST_DEPTH || end.gain > MOST_GAIN;
         self.refused + self.ended.iter().filter(bad).count()
     }
 
