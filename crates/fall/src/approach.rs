@@ -142,8 +142,8 @@ fn clear_time(
         let root = libm::sqrt(opening * opening + 2.0 * bend * gap);
         // The positive root of gap + opening x - bend x²/2, without differences of what is nearly equal.
         let next = if opening > 0.0 { (opening + root) / bend } else { 2.0 * gap / (root - opening) };
-        if !(next < after) {
-            return after.min(next);
+        if next.is_nan() || next >= after {
+            return after;
         }
         after = next;
     }

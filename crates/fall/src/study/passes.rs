@@ -52,7 +52,7 @@ pub fn random_contact(seed: u64, tolerance: f64) -> Result<RandomContact, Error>
     };
     let lengths = libm::pow(10.0, 3.0 * x(7) - 1.0);
     // Every fourth one grazes.
-    let slope = if seed / 18 % 4 == 0 { 0.05 } else { 1.0 };
+    let slope = if (seed / 18).is_multiple_of(4) { 0.05 } else { 1.0 };
     let way = Vector::new(spread(8, 1.0), -slope * (0.3 + x(9)), spread(10, 1.0)).normalize();
     let velocity = way * (lengths * 2.0 * size * 60.0);
     let spin = Vector::new(spread(11, 60.0), spread(12, 60.0), spread(13, 60.0));
