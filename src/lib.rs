@@ -56,6 +56,7 @@
 //! | [`gas`] | smoke, steam and pollen: blobs in the wind, and light through them |
 //! | [`ground`] | sand, mud, snow and soil as columns that slip, stand, are poured, pressed and carried |
 //! | [`sheet`] | flexible surfaces and nets, and their contact with solids |
+//! | [`solid`] | convex rounded solids on their paths, and the gaps between them |
 //! | [`wind`] | the velocity of the air, as a function of place and time |
 //! | [`study`] | accuracy and cost of methods; verification |
 //! | [`cli`] | the command line |
@@ -93,6 +94,7 @@ pub use dlsys_render as render;
 pub use dlsys_session::{self as session, replay};
 pub use dlsys_sheet as sheet;
 pub use dlsys_sim as sim;
+pub use dlsys_solid as solid;
 pub use dlsys_study as study;
 pub use dlsys_surround as surround;
 pub use dlsys_sway as sway;

@@ -218,6 +218,112 @@ fn mistakes_have_their_place() {
     assert!(far.contains("more than 1e7 steps"), "{far}");
 }
 
+/// The lowest point of the only surface.
+fn bottom(scene: &Scene) -> f64 {
+    let surface = &scene.surfaces[0];
+    surface.mesh.vertices.iter().map(|p| surface.placement.point(*p).y).fold(f64::INFINITY, f64::min)
+}
+
+/// A board of 2 m, its upper side at a height of 1.05 m, that begins to tip over at t = 3.
+const BOARD: &str = "solid Board\nground 0\ncurve tip = (0, 0) (3, 0) (3.5, 80) (9, 80)\n\
+    initial string: Board [ f(1.5) -(90) f(0.3) +(90) P ]\nP: if age = 0.2 produce @D Q\n\
+    interpret P: &(80) @P(0.1, 0.08)\ninterpret Q: &(80) @P(0.1, 0.08)\n\
+    interpret Board: f(1) -(90) -(tip(t)) f(-1) for i in 0 .. 2: ( [ &(90) f(0.1*i - 0.1) ^(90) !(0.1) F(2) ] )\n";
+
+#[test]
+fn what_falls_lies_on_a_solid_and_slides_off_when_it_tips() {
+    let session = read(BOARD);
+    let scenes = self::scenes(&session, &[2.0, 2.9, 6.0]);
+    assert!((bottom(&scenes[0]) - 1.05).abs() < 2e-3, "on the board: {}", bottom(&scenes[0]));
+    assert_eq!(surface(&scenes[0]), surface(&scenes[1]), "it lies still");
+    assert!(bottom(&scenes[2]).abs() < 1e-3, "on the ground: {}", bottom(&scenes[2]));
+    // Without the word it falls through what is drawn.
+    let through = read(&BOARD.replace("solid Board\n", ""));
+    assert!(bottom(&self::scenes(&through, &[2.0])[0]) < 0.2);
+}
+
+/// Petals over a dish that turns and rocks, with a paddle that sweeps over it; a production replaces the dish on the way.
+const DISH: &str = "units length 0.1, time 1\nground 0\nsolid Dish Plate Paddle\nwind 1, 0, 0.2 speed 0.6 turbulence 0.3 scale 1\n\
+    initial string: Dish [ f(6) for k in 0 .. 5: ( [ /(60*k) &(70) f(0.8) P(k) ] ) ] Paddle(0)\n\
+    P(k): if age = 0.1 + 0.13*k produce @D Q(k)\nDish: if age = 1.7 produce Plate\nPaddle(a): solve da/dt = 120\n\
+    interpret P(k): @P(0.5, 0.4)\ninterpret Q(k): @P(0.5, 0.4)\n\
+    interpret Dish: Slats\ninterpret Plate: Slats\n\
+    interpret Slats: [ f(4 + 0.2*sin(2*t)) -(90 + 8*sin(3*t)) f(-2) for i in 0 .. 4: ( [ &(90) f(0.8*i - 1.6) ^(90) !(0.15) F(4) ] ) ]\n\
+    interpret Paddle(a): [ f(4.6) /(a) -(90) !(0.2) F(3) ]\n";
+
+#[test]
+fn the_order_of_frames_and_threads_do_not_matter_among_solids() {
+    let session = read(DISH);
+    let times: Vec<f64> = (0..50).map(|i| f64::from(i) * 0.0631).collect();
+    let straight = scenes(&session, &times);
+    let high = |scene: &Scene| places(scene).iter().filter(|(_, at, _)| at.y > 3.0).count();
+    assert!(high(&straight[49]) > 0 && places(&straight[40]) != places(&straight[49]), "they ride on it");
+    let nursery = Nursery::new(&session.model, Settings::default());
+    let strings: Vec<ModuleString> = times.iter().map(|t| string(&session, *t)).collect();
+    std::thread::scope(|scope| {
+        for first in 0..2 {
+            let (nursery, strings, straight) = (&nursery, &strings, &straight);
+            scope.spawn(move || {
+                for i in (first..strings.len()).step_by(2).map(|i| i * 23 % strings.len()) {
+                    assert_eq!(places(&draw(nursery, &strings[i])), places(&straight[i]), "{i}");
+                }
+            });
+        }
+    });
+    for i in [11, 49] {
+        assert_eq!(places(&scenes(&session, &times[i..=i])[0]), places(&straight[i]), "{}", times[i]);
+    }
+}
+
+/// A fruit hangs within the hull of its tree, which is `solid`: it falls through it to the ground, as if the tree were not.
+#[test]
+fn a_fruit_falls_out_of_its_own_tree() {
+    let text = "ground 0\nsolid Tree\ninitial string: Tree [ f(0.8) -(90) f(0.1) A ]\nA: if age = 0.1 produce @D B\n\
+        interpret A: @O(0.08)\ninterpret B: @O(0.08)\n\
+        interpret Tree: !(0.1) F(0.5) [ +(60) F(1) ] [ -(60) F(1) ] F(1)\n";
+    let free = scenes(&read(&text.replace("solid Tree\n", "")), &[0.3, 3.0]);
+    let among = scenes(&read(text), &[0.3, 3.0]);
+    let at = |scenes: &[Scene], k: usize| surface(&scenes[k]).0;
+    assert!((at(&free, 0) - at(&among, 0)).norm() < 1e-3, "{} {}", at(&free, 0), at(&among, 0));
+    assert!((at(&among, 1).y - 0.04).abs() < 1e-3, "{}", at(&among, 1));
+}
+
+/// A solid that sheets push is where they have pushed it: a ball that drops into a cloth stays above it, and a petal that drops later lies on the ball.
+#[test]
+fn what_falls_meets_solids_where_forces_have_led_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut cloth = String::new();
+    for i in 0..9 {
+        (0..9).for_each(|j| cloth += &format!("v {} 1 {}\n", i as f64 / 8.0 - 0.5, j as f64 / 8.0 - 0.5));
+    }
+    for i in 0..8 {
+        for j in 0..8 {
+            let a = 9 * i + j + 1;
+            cloth += &format!("f {a} {} {} {}\n", a + 1, a + 10, a + 9);
+        }
+    }
+    std::fs::write(folder.path().join("cloth.obj"), cloth).expect("written");
+    let text = "tissue cloth = stiffness 1e5, density 500, damping 0.3, thickness 1e-3\n\
+        sheet @Cloth from \"cloth.obj\" of cloth pinned x < -0.49 | x > 0.49\nsolid Ball\n\
+        initial string: [ @Cloth ] Ball(1.3, 0) [ f(2) P ]\n\
+        Ball(y, v): solve dy/dt = v, dv/dt = -9.81 + force_y/0.4 - 2*v\n\
+        P: if age = 1.2 produce @D Q\ninterpret P: @O(0.04)\ninterpret Q: @O(0.04)\n\
+        interpret Ball(y, v): [ f(y) @O(0.3) ]\n";
+    let path = folder.path().join("cloth.dls");
+    std::fs::write(&path, text).expect("written");
+    let session = Session::open(&path, &[]).unwrap_or_else(|refused| panic!("{refused}"));
+    let scene = scenes(&session, &[1.66]).remove(0);
+    let middle = |size: f64| {
+        let of = |s: &&dlsys::scene::Surface| (s.placement.scales[0] - size).abs() < 1e-6;
+        scene.surfaces.iter().find(of).map(|surface| surface.placement.origin)
+    };
+    let (ball, berry) = (middle(0.3).or(middle(0.15)), middle(0.04).or(middle(0.02)));
+    let (ball, berry) = (ball.expect("a ball"), berry.expect("a berry"));
+    assert!(ball.y > 0.5 && ball.y < 1.3, "the cloth carries it: {ball}");
+    assert!((berry - ball).norm() > 0.169, "{berry} {ball}");
+    assert!(berry.y > ball.y, "{berry} {ball}");
+}
+
 /// What an `@D` holds is known at the birth of its module; a drawing that begins to hold one later says so.
 #[test]
 fn a_drawing_that_lets_go_too_late_is_told() {

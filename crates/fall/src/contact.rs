@@ -6,7 +6,7 @@ use crate::step::Step;
 use crate::{Contact, Error, Ground, Motion, Wind};
 
 /// Impacts of one fall that rebound. Those behind have no restitution, so that every fall comes to an end.
-const REBOUNDS: u32 = 64;
+pub(crate) const REBOUNDS: u32 = 64;
 
 impl Rules {
     /// Impact speed below which a body does not rebound, in m/s: the rebound would not rise above the tolerance.
@@ -15,7 +15,7 @@ impl Rules {
     }
 
     /// Time in s in which a body would fall its own size.
-    fn topple(&self) -> f64 {
+    pub(crate) fn topple(&self) -> f64 {
         libm::sqrt(self.size / self.settings.air.gravity.max(f64::MIN_POSITIVE))
     }
 
@@ -26,18 +26,26 @@ impl Rules {
         let demand = |gap: f64, velocity: f64| {
             (gap <= near).then(|| if velocity < -slow { -restitution * velocity } else { 0.0 })
         };
-        let (motion, _) = collide(&self.dynamics, &self.body, ground, &state.motion, &demand);
+        let bounds = ground.bounds(&state.motion, &self.body, &demand);
+        let (motion, _) = collide(&self.dynamics, &state.motion, bounds);
         let stays = self.body.contacts.iter().any(|contact| {
             let arm = motion.turned(contact.point);
             let velocity = motion.velocity + motion.world_spin().cross(&arm);
             ground.gap(&motion, contact) <= near && velocity.y < slow
         });
         let phase = if stays { Phase::Contact } else { Phase::Flight };
-        State { motion, phase, impacts: state.impacts.saturating_add(1), calm: 0.0, rate: None, ..*state }
+        State {
+            motion,
+            phase,
+            impacts: state.impacts.saturating_add(1),
+            calm: 0.0,
+            rate: None,
+            ..state.clone()
+        }
     }
 
     /// Level of the steps in contact.
-    fn contact_level(&self, motion: &Motion) -> u32 {
+    pub(crate) fn contact_level(&self, motion: &Motion) -> u32 {
         let pace = motion.velocity.norm() / self.size + motion.spin.norm();
         let longest = (self.topple() * libm::sqrt(self.settings.tolerance)).min(0.1 / pace.max(1e-300));
         let levels = libm::ceil(libm::log2(self.settings.longest / longest));
@@ -45,22 +53,23 @@ impl Rules {
         (levels.max(0.0) as u32).min(self.settings.deepest)
     }
 
-    /// A step in contact: acceleration, then the impulses by which no contact sinks below the ground, then motion at the new velocity.
+    /// A step in contact, not beyond a time: acceleration, then the impulses by which no contact sinks below the ground, then motion at the new velocity.
     pub(crate) fn slide(
         &self,
         ground: &Ground,
-        state: &State,
+        (state, limit): (&State, f64),
         wind: &impl Wind,
     ) -> Result<(Step, State), Error> {
         let level = self.contact_level(&state.motion);
-        let end = self.grid(state.time, level);
+        let end = self.grid(state.time, level).min(limit);
         let h = end - state.time;
         let (acceleration, angular) = self.dynamics.accelerations(&state.motion, state.time, wind)?;
         let mut moved = state.motion;
         moved.velocity += acceleration * h;
         moved.spin = self.dynamics.spun(&state.motion, angular, h);
         let demand = |gap: f64, _: f64| Some(-gap.max(0.0) / h);
-        let (mut after, pushed) = collide(&self.dynamics, &self.body, ground, &moved, &demand);
+        let (mut after, pushed) = collide(&self.dynamics, &moved, ground.bounds(&moved, &self.body, &demand));
+        let pushed = pushed.is_some();
         let first = Motion { velocity: after.velocity, spin: after.spin, ..state.motion };
         after.position += after.velocity * h;
         after.attitude = crate::motion::turn(after.attitude, after.spin * h);
@@ -77,7 +86,7 @@ impl Rules {
         } else {
             Phase::Contact
         };
-        let next = State { time: end, motion: after, level, phase, calm, rate: None, ..*state };
+        let next = State { time: end, motion: after, level, phase, calm, rate: None, ..state.clone() };
         Ok((Step::new(state.time, first, end, after), next))
     }
 
@@ -109,7 +118,7 @@ impl Rules {
     }
 
     /// Lifts a body that rotation has brought below the ground. The kinetic energy pays for the height.
-    fn lift(&self, ground: &Ground, motion: &mut Motion) {
+    pub(crate) fn lift(&self, ground: &Ground, motion: &mut Motion) {
         let gap = ground.lowest(motion, &self.body);
         if gap >= 0.0 {
             return;

@@ -22,6 +22,12 @@ pub enum Error {
         /// Place in m.
         at: [f64; 3],
     },
+    /// The solids are not known.
+    #[error("the solids at {time:.6} s are not known")]
+    Solids {
+        /// Time in s.
+        time: f64,
+    },
     /// The error is too large even with the shortest step.
     #[error(
         "at {time:.6} s, steps of {step:.1e} s are not short enough: the error is {excess:.1e} times the tolerance"
@@ -46,6 +52,13 @@ pub enum Error {
         /// Time that was reached, in s.
         time: f64,
     },
+}
+
+impl From<dlsys_solid::Error> for Error {
+    fn from(error: dlsys_solid::Error) -> Error {
+        let dlsys_solid::Error::Value { name, value, expected } = error;
+        Error::Value { name, value, expected }
+    }
 }
 
 /// Checks that a value is in a range.

@@ -1,12 +1,13 @@
 //! The fall of one body: a pure function of its release, evaluated at any time in any order.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use crate::error::check;
 use crate::forces::Dynamics;
 use crate::motion::Packed;
 use crate::step::{Step, bogacki_shampine};
-use crate::{Body, Error, Ground, Motion, Settings, Wind};
+use crate::{Body, Error, Ground, Motion, Obstacles, Open, Settings, Wind};
 
 /// What a body is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,7 +18,7 @@ pub(crate) enum Phase {
 }
 
 /// All that the next step depends on, beside the rules and the wind.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct State {
     pub(crate) time: f64,
     pub(crate) motion: Motion,
@@ -31,12 +32,20 @@ pub(crate) struct State {
     pub(crate) steps: u64,
     /// Derivative in flight, if the step before has computed it.
     pub(crate) rate: Option<Packed>,
+    /// The solids that it passes through until it has left them.
+    pub(crate) ignored: Arc<[u64]>,
+    /// A print of the solids near a body that rests.
+    pub(crate) support: u64,
+    /// The last step took no time.
+    pub(crate) halted: bool,
 }
 
 /// What does not change during a fall.
 #[derive(Clone, Debug)]
 pub(crate) struct Rules {
     pub(crate) body: Body,
+    /// Its convex parts, for contact with solids.
+    pub(crate) parts: Vec<dlsys_solid::Shape>,
     pub(crate) dynamics: Dynamics,
     pub(crate) ground: Option<Ground>,
     pub(crate) settings: Settings,
@@ -57,6 +66,8 @@ pub(crate) struct Part {
     pub(crate) flight: bool,
 }
 
+/// The print of the surroundings of a body that rests for ever: there are no solids.
+pub(crate) const FINAL: u64 = 0;
 /// Number of states that are kept for going back: some kilobytes a body, of which a scene may have many.
 const KEPT: usize = 16;
 /// Most jolts that are noted of a fall.
@@ -109,7 +120,10 @@ impl Fall {
             ground.height += ground.lowest(&motion, &body).min(0.0);
         }
         let dynamics = Dynamics::new(&body, settings.air, ground);
-        let rules = Rules { size: body.size(), moment: dynamics.moment(), body, dynamics, ground, settings };
+        let balls: Vec<_> = body.contacts.iter().map(|contact| (contact.point, contact.radius)).collect();
+        let parts = if balls.is_empty() { Vec::new() } else { dlsys_solid::parts(&balls)? };
+        let (size, moment) = (body.size(), dynamics.moment());
+        let rules = Rules { size, moment, body, parts, dynamics, ground, settings };
         let state = State {
             time,
             motion,
@@ -119,10 +133,13 @@ impl Fall {
             calm: 0.0,
             steps: 0,
             rate: None,
+            ignored: Arc::from([]),
+            support: 0,
+            halted: false,
         };
         Ok(Fall {
             rules,
-            release: state,
+            release: state.clone(),
             step: None,
             state,
             kept: Vec::new(),
@@ -146,7 +163,7 @@ impl Fall {
 
     /// The time from which on the body rests, in s; `None` if that is later than all times asked for.
     pub fn rest(&self) -> Option<f64> {
-        self.rest.map(|state| state.time)
+        self.rest.as_ref().map(|state| state.time)
     }
 
     /// The times in s, up to the latest one asked for, at which the velocity jumped by more than the speed below which a body does not
@@ -184,11 +201,26 @@ impl Fall {
     ///
     /// A time or a wind that is not finite, an error that no step makes small enough, too many steps.
     pub fn at(&mut self, time: f64, wind: &impl Wind) -> Result<Motion, Error> {
+        self.among(time, wind, &Open)
+    }
+
+    /// The same among solids. What overlaps one at the release, or where it appears, passes through it until it has left it, and so does what is
+    /// squeezed.
+    ///
+    /// # Errors
+    ///
+    /// As of [`at`](Fall::at), and solids that are not known at a time.
+    pub fn among(
+        &mut self,
+        time: f64,
+        wind: &impl Wind,
+        obstacles: &impl Obstacles,
+    ) -> Result<Motion, Error> {
         check("a time (s)", time, true, "a finite number")?;
         if time <= self.release.time {
             return Ok(self.release.motion);
         }
-        if let Some(rest) = self.rest.filter(|rest| rest.time <= time) {
+        if let Some(rest) = self.rest.as_ref().filter(|rest| rest.time <= time) {
             return Ok(rest.motion);
         }
         if self.step.is_some_and(|step| time < step.start) {
@@ -197,7 +229,7 @@ impl Fall {
                 return Ok(step.at(time));
             }
             let after = self.kept.partition_point(|state| state.time <= time);
-            self.state = after.checked_sub(1).map_or(self.release, |index| self.kept[index]);
+            self.state = after.checked_sub(1).map_or(&self.release, |index| &self.kept[index]).clone();
             self.step = None;
         }
         loop {
@@ -206,33 +238,46 @@ impl Fall {
             {
                 return Ok(step.at(time));
             }
-            if self.state.phase == Phase::Rest {
-                self.rest = Some(self.state);
+            // Among solids, what rests may be moved again.
+            if self.state.phase == Phase::Rest && self.state.support == FINAL {
+                self.rest = Some(self.state.clone());
                 return Ok(self.state.motion);
             }
-            let (step, next) = self.rules.advance(&self.state, wind)?;
             let before = self.state.motion;
+            let (step, next) = self.rules.advance(&self.state, wind, obstacles)?;
             self.note(step.start, &before, &step.first);
             self.note(step.end, &step.last, &next.motion);
+            let (steps, reached) = (next.steps, next.time);
             (self.step, self.state) = (Some(step), next);
             self.keep(&step);
-            if next.steps > self.rules.settings.steps {
+            if steps > self.rules.settings.steps {
                 let from = self.release.time;
-                return Err(Error::Steps { from, steps: next.steps, time: next.time });
+                return Err(Error::Steps { from, steps, time: reached });
             }
         }
     }
 
     /// Makes the next step, up to a time in s; for studies. `None` at rest and after that time.
-    pub(crate) fn part(&mut self, until: f64, wind: &impl Wind) -> Result<Option<Part>, Error> {
-        let before = self.state;
+    pub(crate) fn part(
+        &mut self,
+        until: f64,
+        wind: &impl Wind,
+        obstacles: &impl Obstacles,
+    ) -> Result<Option<Part>, Error> {
+        let before = self.state.clone();
         if before.phase == Phase::Rest || before.time >= until {
             return Ok(None);
         }
-        let (step, next) = self.rules.advance(&before, wind)?;
-        (self.step, self.state) = (Some(step), next);
+        let (step, next) = self.rules.advance(&before, wind, obstacles)?;
         let flight = before.phase == Phase::Flight;
-        Ok(Some(Part { before: before.motion, within: step.last, after: next.motion, flight }))
+        let part = Part { before: before.motion, within: step.last, after: next.motion, flight };
+        (self.step, self.state) = (Some(step), next);
+        Ok(Some(part))
+    }
+
+    /// The time up to which it has been followed, in s; for studies.
+    pub(crate) fn reached(&self) -> f64 {
+        self.state.time
     }
 
     /// Notes a jolt, if the velocity before and after a time differs by one.
@@ -261,7 +306,7 @@ impl Fall {
         if !due || self.kept.last().is_some_and(|last| last.steps >= self.state.steps) {
             return;
         }
-        self.kept.push(self.state);
+        self.kept.push(self.state.clone());
         if self.kept.len() >= KEPT {
             self.stride *= 2;
             let stride = self.stride;
@@ -293,10 +338,16 @@ impl Rules {
     }
 
     /// The next step, and the state after it.
-    fn advance(&self, state: &State, wind: &impl Wind) -> Result<(Step, State), Error> {
-        let (step, mut next) = match (state.phase, &self.ground) {
-            (Phase::Contact, Some(ground)) => self.slide(ground, state, wind)?,
-            _ => self.fly(state, wind)?,
+    fn advance(
+        &self,
+        state: &State,
+        wind: &impl Wind,
+        obstacles: &impl Obstacles,
+    ) -> Result<(Step, State), Error> {
+        let (step, mut next) = match (obstacles.span(state.time)?, state.phase, &self.ground) {
+            (Some(span), ..) => self.pass(&span, state, wind)?,
+            (None, Phase::Contact, Some(ground)) => self.slide(ground, (state, f64::INFINITY), wind)?,
+            (None, ..) => self.fly(state, wind)?,
         };
         next.steps = state.steps + 1;
         Ok((step, next))
@@ -304,9 +355,25 @@ impl Rules {
 
     /// A step in flight, up to the next impact at most.
     fn fly(&self, state: &State, wind: &impl Wind) -> Result<(Step, State), Error> {
+        let (step, next) = self.free_step((state, f64::INFINITY), wind)?;
+        let contact = self
+            .ground
+            .and_then(|ground| Some((ground, ground.first_contact(&step, &self.body, self.depth())?)));
+        let Some((ground, time)) = contact else { return Ok((step, next)) };
+        let step = step.until(time);
+        let struck = State { time, motion: step.last, level: next.level, ..state.clone() };
+        Ok((step, self.strike(&ground, &struck)))
+    }
+
+    /// A step in flight, not beyond a time, as if there were nothing to touch.
+    pub(crate) fn free_step(
+        &self,
+        (state, limit): (&State, f64),
+        wind: &impl Wind,
+    ) -> Result<(Step, State), Error> {
         let mut level = state.level;
         loop {
-            let end = self.grid(state.time, level);
+            let end = self.grid(state.time, level).min(limit);
             let h = end - state.time;
             let (last, rate, error) =
                 bogacki_shampine(&self.dynamics, (&state.motion, state.rate), (state.time, end), wind)?;
@@ -323,18 +390,8 @@ impl Rules {
                 level -= 1;
             }
             let step = Step::new(state.time, state.motion, end, last);
-            let contact = self
-                .ground
-                .and_then(|ground| Some((ground, ground.first_contact(&step, &self.body, self.depth())?)));
-            let Some((ground, time)) = contact else {
-                return Ok((
-                    step,
-                    State { time: end, motion: last, level, calm: 0.0, rate: Some(rate), ..*state },
-                ));
-            };
-            let step = step.until(time);
-            let struck = State { time, motion: step.last, level, ..*state };
-            return Ok((step, self.strike(&ground, &struck)));
+            let next = State { time: end, motion: last, level, calm: 0.0, rate: Some(rate), ..state.clone() };
+            return Ok((step, next));
         }
     }
 

@@ -1,8 +1,17 @@
 //! The ground, and the search for the instant at which a body touches it.
 
+use nalgebra::Matrix3;
+
 use crate::error::check;
+use crate::impulse::{Bound, Carrier};
 use crate::step::Step;
-use crate::{Body, Contact, Error, Motion, Vector};
+use crate::{Body, Contact, Error, Motion, Surface, Vector};
+
+/// Whether, and with which least velocity along its normal, a contact takes part: from its gap and its velocity.
+pub(crate) type Demand<'a> = &'a dyn Fn(f64, f64) -> Option<f64>;
+
+/// The number of the ground among what is touched.
+pub(crate) const GROUND: usize = usize::MAX;
 
 /// A level rigid floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +38,33 @@ impl Ground {
         check("a friction", friction, friction >= 0.0, "0 or more")?;
         check("a restitution", restitution, (0.0..=1.0).contains(&restitution), "0 to 1")?;
         check("a resistance to rolling", rolling, rolling >= 0.0, "0 or more")
+    }
+
+    /// How what touches it is held.
+    pub(crate) fn surface(&self) -> Surface {
+        Surface { friction: self.friction, restitution: self.restitution, rolling: self.rolling }
+    }
+
+    /// The contacts that `demand` lets take part, with the least velocity upward that it gives: from height and velocity upward.
+    pub(crate) fn bounds(&self, motion: &Motion, body: &Body, demand: Demand) -> Vec<Bound> {
+        let (turn, spin) = (motion.attitude.to_rotation_matrix(), motion.world_spin());
+        let bound = |contact: &Contact| {
+            let mut arm = turn * contact.point;
+            arm.y -= contact.radius;
+            let climb = motion.velocity.y + spin.z * arm.x - spin.x * arm.z;
+            let least = demand(motion.position.y + arm.y - self.height, climb)?;
+            Some(Bound {
+                arm,
+                frame: Matrix3::identity(),
+                surface: Vector::zeros(),
+                carrier: Carrier::default(),
+                radius: contact.radius,
+                least,
+                grip: self.surface(),
+                number: GROUND,
+            })
+        };
+        body.contacts.iter().filter_map(bound).collect()
     }
 
     /// Height of a contact above the ground, in m.

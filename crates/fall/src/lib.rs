@@ -47,6 +47,8 @@
 #![warn(missing_docs)]
 
 mod air;
+mod among;
+mod approach;
 mod body;
 mod contact;
 mod error;
@@ -55,6 +57,8 @@ mod forces;
 mod ground;
 mod impulse;
 mod motion;
+mod obstacles;
+mod pairs;
 mod settings;
 mod step;
 pub mod study;
@@ -66,6 +70,7 @@ pub use error::Error;
 pub use fall::Fall;
 pub use ground::Ground;
 pub use motion::Motion;
+pub use obstacles::{Obstacle, Obstacles, Open, Span, Surface};
 pub use settings::Settings;
 
 /// A vector of three components.

@@ -54,6 +54,30 @@ impl Step {
         let [u, v] = [self.first.velocity.y * span, self.last.velocity.y * span];
         // The second derivative of a cubic is linear: one of its ends is the largest.
         let lift = (6.0 * rise - 4.0 * u - 2.0 * v).abs().max((6.0 * rise - 2.0 * u - 4.0 * v).abs());
+        self.bound_with(lift, distance)
+    }
+
+    /// The same of the place of the point, whatever the direction.
+    pub(crate) fn curvature(&self, distance: f64) -> f64 {
+        let span = self.span();
+        let rise = (self.last.position - self.first.position) * 6.0;
+        let [u, v] = [self.first.velocity * span, self.last.velocity * span];
+        let bend = (rise - u * 4.0 - v * 2.0).norm().max((rise - u * 2.0 - v * 4.0).norm());
+        self.bound_with(bend, distance)
+    }
+
+    /// A bound of the speed of the centre of mass, in m/s.
+    pub(crate) fn speed(&self) -> f64 {
+        let span = self.span();
+        let rise = self.last.position - self.first.position;
+        let [u, v] = [self.first.velocity, self.last.velocity];
+        // The derivative of a cubic is within the hull of three points.
+        u.norm().max(v.norm()).max((rise * (3.0 / span) - u - v).norm())
+    }
+
+    /// With the bound of the centre of mass times the square of the length of the step.
+    fn bound_with(&self, lift: f64, distance: f64) -> f64 {
+        let span = self.span();
         let [u, v] = self.turning.map(|rate| rate * span);
         let turn = (self.turned * 6.0 - u * 4.0 - v * 2.0)
             .norm()

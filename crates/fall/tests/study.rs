@@ -57,6 +57,30 @@ fn bodies_land() -> Result<(), dlsys_fall::Error> {
     Ok(())
 }
 
+#[test]
+fn bodies_touch_solids() -> Result<(), dlsys_fall::Error> {
+    check(&study::parabola()?, 1e-12);
+    check(&study::moving_plate()?, 1e-9);
+    check(&study::bounce_on_plate()?, 1e-8);
+    check(&study::carry()?, 1e-4);
+    check(&study::slope()?, 1e-4);
+    Ok(())
+}
+
+/// Plates, balls and blocks against plates, posts and boxes, at up to 100 lengths a frame: none passes through another, and no contact makes energy.
+#[test]
+fn nothing_passes_through_solids() -> Result<(), dlsys_fall::Error> {
+    let mut touched = 0;
+    for seed in 0..360 {
+        let end = study::random_contact(seed, 1e-3)?;
+        assert!(!end.pierced && end.depth < 1e-3 && end.gain < 1e-9, "{end:?}");
+        assert!(end.steps < 300_000, "{end:?}");
+        touched += usize::from(end.touched);
+    }
+    assert!(touched > 180, "{touched}");
+    Ok(())
+}
+
 /// Throws at up to 300 m/s, spins of up to 100 rad/s: every body rests, and none is ever deeper than the tolerance of an impact.
 #[test]
 fn random_throws_rest_above_ground() -> Result<(), dlsys_fall::Error> {

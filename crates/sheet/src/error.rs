@@ -135,6 +135,13 @@ pub enum Rejection {
     None,
 }
 
+impl From<dlsys_solid::Error> for Error {
+    fn from(error: dlsys_solid::Error) -> Error {
+        let dlsys_solid::Error::Value { name, value, expected } = error;
+        Error::Value { name, value, expected }
+    }
+}
+
 /// Checks that a value is in a range.
 pub(crate) fn check(name: &'static str, value: f64, good: bool, expected: &'static str) -> Result<(), Error> {
     if good && value.is_finite() { Ok(()) } else { Err(Error::Value { name, value, expected }) }

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use dlsys_fall::study::{RandomLanding, random_landing};
+use dlsys_fall::study::{RandomContact, RandomLanding, random_contact, random_landing};
 use dlsys_fall::{self as fall, Body, Fall, Ground, Motion, Settings, Vector};
 use dlsys_sim::brief;
 use dlsys_wind::study::Convergence;
@@ -58,6 +58,56 @@ impl Landings {
             ("steps until rest, on average", brief(steps, 3)),
             ("steps until rest, at most", brief(most(|end| end.steps as f64), 6)),
             ("time for a second of a petal in the wind", format!("{} µs", brief(self.pace * 1e6, 3))),
+        ];
+        for (name, value) in rows {
+            table.push([name.to_owned(), value]);
+        }
+        table.write("  ", &mut out);
+        out
+    }
+}
+
+/// Bodies that are thrown at solids, and solids that are moved through bodies, at random.
+#[derive(Clone, Debug)]
+pub struct Contacts {
+    ended: Vec<RandomContact>,
+    /// Number of passes that could not be followed.
+    refused: usize,
+}
+
+/// Largest gain of energy by contact with solids that stand still, in parts of that at the release.
+const MOST_GAIN: f64 = 1e-9;
+/// Largest depth in a solid, in half-extents: the tolerance.
+const MOST_DEPTH: f64 = 1e-3;
+
+impl Contacts {
+    /// This many passes. One that cannot be followed counts as failed.
+    pub fn new(count: u64) -> Contacts {
+        let ended: Vec<_> = (0..count).filter_map(|seed| random_contact(seed, 1e-3).ok()).collect();
+        Contacts { refused: count as usize - ended.len(), ended }
+    }
+
+    /// Number of bodies that passed through a solid, came too deep into it, or gained energy.
+    pub fn failed(&self) -> usize {
+        let bad = |end: &&RandomContact| end.pierced || end.depth > MOST_DEPTH || end.gain > MOST_GAIN;
+        self.refused + self.ended.iter().filter(bad).count()
+    }
+
+    /// One line for each quantity.
+    pub fn table(&self) -> String {
+        let most = |of: fn(&RandomContact) -> f64| self.ended.iter().map(of).fold(0.0, f64::max);
+        let count = self.ended.len() + self.refused;
+        let number = |of: fn(&RandomContact) -> bool| self.ended.iter().filter(|end| of(end)).count();
+        let mut out = "falling: plates, balls and blocks that meet thin plates, posts and boxes at random, at up to 100 of their lengths in a frame of 1/60 s\n"
+            .to_owned();
+        let mut table = Table::default();
+        let rows = [
+            ("touched", format!("{} of {count}", number(|end| end.touched))),
+            ("refused", format!("{} of {count}", self.refused)),
+            ("passed through", format!("{} of {count}", number(|end| end.pierced))),
+            ("deepest contact in a solid", format!("{:.1e} half-extents", most(|end| end.depth))),
+            ("largest gain of energy by what stands still", format!("{:.1e}", most(|end| end.gain))),
+            ("steps in half a second, at most", brief(most(|end| end.steps as f64), 6)),
         ];
         for (name, value) in rows {
             table.push([name.to_owned(), value]);

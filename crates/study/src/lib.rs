@@ -57,7 +57,7 @@ pub use coupling::{
     Row, Thresholds, Trial, coupling_csv, coupling_json, coupling_study, coupling_text, has_feedback,
 };
 pub use error::Error;
-pub use falls::{Landings, exact_fall_table};
+pub use falls::{Contacts, Landings, exact_fall_table};
 pub use files::{csv, hard_csv, hard_json, json};
 pub use gases::{exact_gas_table, gas_speed_table};
 pub use grounds::{exact_ground_table, ground_rule_table, ground_speed_table};

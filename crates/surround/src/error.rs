@@ -13,6 +13,7 @@ use dlsys_tree::Lineage;
 use dlsys_wind as wind;
 
 use crate::advice;
+use crate::paths::Meets;
 
 /// The stem with which the mechanics fail.
 #[derive(Clone, Debug)]
@@ -120,7 +121,7 @@ pub enum Error {
         span: Span,
     },
     /// A body that bends or falls, so that its place depends on the wind that it would push.
-    #[error("the body of `{kind}` (module {lineage}) cannot {}: it {}", if *.meets { "meet sheets" } else { "push the wind" }, if *.falls { "falls" } else { "bends in it" })]
+    #[error("the body of `{kind}` (module {lineage}) cannot {}: it {}", .meets.words(), if *.falls { "falls" } else { "bends in it" })]
     PassiveSolid {
         /// Name of the kind of the module.
         kind: String,
@@ -128,8 +129,8 @@ pub enum Error {
         lineage: Lineage,
         /// It is let go; otherwise it stands on stems that give way, or holds one.
         falls: bool,
-        /// It is one that sheets would meet; otherwise one that would push the wind.
-        meets: bool,
+        /// What it would meet.
+        meets: Meets,
         /// The time in units of the model.
         time: f64,
         /// Its name in the declaration.
@@ -142,13 +143,25 @@ pub enum Error {
         span: Span,
     },
     /// Too many bodies.
-    #[error("more than {most} bodies push the wind at t = {time}")]
+    #[error("more than {most} bodies {} at t = {}", .meets.words(), brief(*.time, 8))]
     TooManySolids {
         /// The largest number.
         most: usize,
         /// The time in units of the model.
         time: f64,
+        /// What they meet.
+        meets: Meets,
         /// The name in the declaration of the first one beyond.
+        span: Span,
+    },
+    /// A solid that no body can have for an obstacle.
+    #[error("a body cannot be in the way of what falls at t = {}: {error}", brief(*.time, 8))]
+    Obstacle {
+        /// The reason.
+        error: fall::Error,
+        /// The time in units of the model.
+        time: f64,
+        /// The first name in the declaration.
         span: Span,
     },
     /// A gas cannot be followed.
@@ -337,8 +350,9 @@ impl Error {
             Error::PassiveSolid { falls, meets, time, span, .. } => Diagnostic::error(self.to_string())
                 .at(*span, format!("declared here, and drawn at t = {}", brief(*time, 8)))
                 .note(match meets {
-                    true => "sheets meet bodies that the equations of the model move",
-                    false => "the wind is pushed by bodies that the equations of the model move",
+                    Meets::Sheets => "sheets meet bodies that the equations of the model move",
+                    Meets::Wind => "the wind is pushed by bodies that the equations of the model move",
+                    Meets::Falling => "what falls meets bodies that the equations of the model move",
                 })
                 .help(match falls {
                     true => "give what is let go a module of its own that is not `solid`",
@@ -348,11 +362,12 @@ impl Error {
                 .at(*span, "declared here")
                 .note("its growth would follow the wind, and the wind its bodies, at one and the same time")
                 .help("leave out `solid`, or let the rules do without `strain`"),
-            Error::TooManySolids { most, time, span } => {
-                Diagnostic::error(format!("more than {most} bodies push the wind at t = {}", brief(*time, 8)))
-                    .at(*span, "of this name is the first one beyond")
-                    .help("draw several bodies in one module, or name fewer modules")
-            }
+            Error::TooManySolids { span, .. } => Diagnostic::error(self.to_string())
+                .at(*span, "of this name is the first one beyond")
+                .help("draw several bodies in one module, or name fewer modules"),
+            Error::Obstacle { span, .. } => Diagnostic::error(self.to_string())
+                .at(*span, "declared here")
+                .help("look at the places, the sizes and the speed of what these modules draw"),
             Error::Sheet { error, span, .. } => {
                 let diagnostic = Diagnostic::error(self.to_string()).at(*span, "it is placed here");
                 advice::on_sheet(error, diagnostic)

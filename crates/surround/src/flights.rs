@@ -2,7 +2,7 @@
 //!
 //! A release is found when growth passes the production that makes the module. The part then has the pose in which the branch holds
 //! it, and the velocity that it has there: both from two drawings, the second a little later, as if the branch still held it. So
-//! growth, stems in the wind, and other flights give their motion to what they let go.
+//! growth, stems in the wind, and other flights give their motion to what they let go. On its way it meets the solids of the scene.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -13,13 +13,14 @@ use dlsys_geometry::turtle::{self, FreePart, Origin, PartKey, Pose, StemKey};
 use dlsys_model::{KindId, Model, Successor};
 use dlsys_sim::Event;
 use dlsys_sway::{Matrix, Vector};
-use dlsys_tree::ModuleString;
+use dlsys_tree::{Module, ModuleString};
 
 use crate::Error;
 use crate::bending::BentStems;
 use crate::body::rotation_vector;
 use crate::descent::Descent;
 use crate::loose::{Loose, stand};
+use crate::obstacles::{Among, Obstacles};
 use crate::place::Place;
 use crate::points::{Pair, rigid_motion};
 use crate::weather::{Gusts, Sampler};
@@ -137,30 +138,7 @@ impl<'m> Flights<'m> {
         if !self.prunes {
             return string.clone();
         }
-        // Places of the brackets that are open, with the length that the list of places had before each.
-        let mut kept: Vec<usize> = Vec::new();
-        let mut open: Vec<(usize, bool)> = Vec::new();
-        for (place, module) in string.iter().enumerate() {
-            match module.kind {
-                KindId::OPEN => open.push((kept.len(), false)),
-                _ if modules.contains(&module.lineage.id) && !module.kind.is_bracket() => {
-                    open.iter_mut().for_each(|(_, needed)| *needed = true);
-                }
-                _ => {}
-            }
-            kept.push(place);
-            if module.kind == KindId::CLOSE
-                && let Some((before, false)) = open.pop()
-            {
-                kept.truncate(before);
-            }
-        }
-        let mut way = ModuleString::default();
-        way.reset(string.time);
-        for module in kept.into_iter().map(|place| string.get(place)) {
-            way.push(module.kind, module.parameters.iter().copied(), module.age, module.lineage);
-        }
-        way
+        pruned(string, |module| modules.contains(&module.lineage.id))
     }
 
     /// The parts of a string that are not known.
@@ -297,10 +275,12 @@ impl<'m> Flights<'m> {
             None => (*offset, *axes),
             Some(fall) => {
                 let gusts = Gusts(&self.wind);
-                let moved = fall.at(time, &gusts).map_err(|error| {
+                let obstacles = self.wind.obstacles();
+                let moved = fall.among(time, &gusts, &Among(obstacles)).map_err(|error| {
                     let failed =
                         Error::falling(model, origin, Some(fall.body()), (error, place.time_at(time)));
-                    self.wind.failure().unwrap_or(failed)
+                    let known = obstacles.and_then(Obstacles::failure);
+                    known.or_else(|| self.wind.failure()).unwrap_or(failed)
                 })?;
                 (moved.point(*offset), moved.attitude.to_rotation_matrix().into_inner() * *axes)
             }
@@ -312,8 +292,36 @@ impl<'m> Flights<'m> {
     }
 }
 
+/// A string without the branches in which no module is needed.
+pub(crate) fn pruned(string: &ModuleString, is_needed: impl Fn(Module) -> bool) -> ModuleString {
+    // Places of the brackets that are open, with the length that the list of places had before each.
+    let mut kept: Vec<usize> = Vec::new();
+    let mut open: Vec<(usize, bool)> = Vec::new();
+    for (place, module) in string.iter().enumerate() {
+        match module.kind {
+            KindId::OPEN => open.push((kept.len(), false)),
+            _ if !module.kind.is_bracket() && is_needed(module) => {
+                open.iter_mut().for_each(|(_, needed)| *needed = true);
+            }
+            _ => {}
+        }
+        kept.push(place);
+        if module.kind == KindId::CLOSE
+            && let Some((before, false)) = open.pop()
+        {
+            kept.truncate(before);
+        }
+    }
+    let mut way = ModuleString::default();
+    way.reset(string.time);
+    for module in kept.into_iter().map(|place| string.get(place)) {
+        way.push(module.kind, module.parameters.iter().copied(), module.age, module.lineage);
+    }
+    way
+}
+
 /// True if a polygon may be open where a module ends.
-fn has_open_polygons(model: &Model) -> bool {
+pub(crate) fn has_open_polygons(model: &Model) -> bool {
     let count = |string: &Successor, name: &str| {
         string.kinds().filter(|kind| model.kinds.get(*kind).name == name).count()
     };

@@ -26,7 +26,7 @@ use dlsys_wind::Draw;
 use crate::descent::Descent;
 use crate::leading::Leading;
 use crate::line::{Exerted, Line};
-use crate::paths::{INSTANTS, Path, Watch};
+use crate::paths::{INSTANTS, Meets, Path, Watch};
 use crate::place::Place;
 use crate::tracks::{Hung, Part, Passage, Tick, Track};
 use crate::weather::{Gusts, Sampler};
@@ -202,7 +202,7 @@ impl<'m> Hanging<'m> {
                 Err(error) => return Err(error),
             }
             let around = (self.model, &self.place);
-            watch.note((instant, &string), around, &view.descent, &mut scene)?;
+            watch.note((instant, &string), around, (&view.descent, Meets::Sheets), &mut scene)?;
             if let Some(exerted) = exerted.filter(|_| instant == 0)
                 && let Err(error) = exerted.act(growth, (begin, length), &self.place)
             {

@@ -9,6 +9,7 @@ use dlsys_geometry::scene::Scene;
 use dlsys_geometry::turtle::{self, Origin, Passive};
 use dlsys_model::Model;
 use dlsys_sheet::{Attitude, Place as Stand, Shape, Vector};
+use dlsys_solid::Path as Course;
 use dlsys_tree::ModuleString;
 
 use crate::Error;
@@ -18,33 +19,29 @@ use crate::points::{Pair, rigid_motion};
 use crate::solids::{MOST_BODIES, corners, rounded};
 
 /// The instants of a tick, or of a part of one, at which solids are drawn, in parts of it.
-pub(crate) const INSTANTS: [f64; 4] = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0];
+pub(crate) const INSTANTS: [f64; 4] = Course::INSTANTS;
 /// Most iterations to find a rotation, each of which squares the error.
 const ITERATIONS: usize = 8;
 
-/// A polynomial through values at [`INSTANTS`], over the parts of a tick.
-#[derive(Clone, Copy, Debug, Default)]
-struct Cubic([Vector; 4]);
+/// What meets solids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Meets {
+    /// The wind, which they push.
+    Wind,
+    /// Sheets.
+    Sheets,
+    /// What is let go.
+    Falling,
+}
 
-impl Cubic {
-    fn through(values: [Vector; 4]) -> Cubic {
-        let [a, b, c, d] = values;
-        // What stands is exactly at rest.
-        let [b, c, d] = [b - a, c - a, d - a];
-        let first = (b * 18.0 - c * 9.0 + d * 2.0) / 2.0;
-        let second = (c * 36.0 - b * 45.0 - d * 9.0) / 2.0;
-        let third = (b * 27.0 - c * 27.0 + d * 9.0) / 2.0;
-        Cubic([a, first, second, third])
-    }
-
-    fn value(&self, part: f64) -> Vector {
-        let [a, b, c, d] = self.0;
-        a + (b + (c + d * part) * part) * part
-    }
-
-    fn slope(&self, part: f64) -> Vector {
-        let [_, b, c, d] = self.0;
-        b + (c * 2.0 + d * (3.0 * part)) * part
+impl Meets {
+    /// What bodies do with it.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Meets::Wind => "push the wind",
+            Meets::Sheets => "meet sheets",
+            Meets::Falling => "be in the way of what falls",
+        }
     }
 }
 
@@ -54,32 +51,29 @@ pub(crate) struct Path {
     /// The module that draws it where the path begins.
     pub(crate) origin: Origin,
     pub(crate) shape: Shape,
-    /// Where the tick begins, and its length, in s.
-    begin: f64,
-    length: f64,
-    centre: Cubic,
-    /// The rotation vector since the beginning of the tick.
-    turn: Cubic,
+    course: Course,
 }
 
 impl Path {
     /// Adds ways at the instants, in m.
     pub(crate) fn deviate(&mut self, ways: [Vector; 4]) {
-        let more = Cubic::through(ways);
-        self.centre.0.iter_mut().zip(more.0).for_each(|(here, more)| *here += more);
+        self.course.deviate(ways);
     }
 
     /// Where it is at a time in s.
     pub(crate) fn place(&self, time: f64) -> Stand {
-        let part = (time - self.begin) / self.length;
-        let (turn, rate) = (self.turn.value(part), self.turn.slope(part) / self.length);
-        Stand {
-            position: self.centre.value(part),
-            attitude: Attitude::from_scaled_axis(turn),
-            velocity: self.centre.slope(part) / self.length,
-            spin: rate + turn.cross(&rate) / 2.0,
-        }
+        self.course.place(time)
     }
+}
+
+/// A solid through a tick, as what falls meets it.
+pub(crate) struct Body {
+    /// The module that draws it where the tick begins.
+    pub(crate) module: u64,
+    /// The diagonal of the box around it, in m.
+    pub(crate) diagonal: f64,
+    pub(crate) parts: Vec<Shape>,
+    pub(crate) path: Course,
 }
 
 /// A solid as it is drawn at an instant, in m.
@@ -116,7 +110,7 @@ impl Watch {
         &mut self,
         (instant, string): (usize, &ModuleString),
         (model, place): (&Model, &Place),
-        descent: &Descent,
+        (descent, meets): (&Descent, Meets),
         scene: &mut Scene,
     ) -> Result<(), Error> {
         let is_solid =
@@ -135,7 +129,7 @@ impl Watch {
             };
             if let Some(passive) = solid.passive {
                 let kind = model.kinds.get(solid.origin.kind).name.clone();
-                let (falls, meets) = (passive == Passive::Falls, true);
+                let falls = passive == Passive::Falls;
                 let lineage = solid.origin.lineage;
                 return Err(Error::PassiveSolid {
                     kind,
@@ -147,7 +141,12 @@ impl Watch {
                 });
             }
             if drawn.len() == MOST_BODIES {
-                return Err(Error::TooManySolids { most: MOST_BODIES, time: string.time, span: span() });
+                return Err(Error::TooManySolids {
+                    most: MOST_BODIES,
+                    time: string.time,
+                    meets,
+                    span: span(),
+                });
             }
             let metre = place.units.length;
             let ball = |(point, radius): &(dlsys_geometry::scene::Point, f64)| {
@@ -192,6 +191,17 @@ impl Watch {
         way > most
     }
 
+    /// The solids of a tick as what falls meets them: sharp where they are drawn so.
+    pub(crate) fn bodies(&self, begin: f64, length: f64) -> Vec<Body> {
+        let body = |(first, later): (&Drawn, &[Option<Vec<Vector>>; 3])| {
+            let (balls, middle, path) = course(first, later, (begin, length));
+            let about: Vec<_> = balls.iter().map(|(point, radius)| (point - middle, *radius)).collect();
+            let parts = dlsys_solid::parts(&about).ok()?;
+            Some(Body { module: first.origin.lineage.id, diagonal: first.diagonal(), parts, path })
+        };
+        self.first.iter().zip(&self.later).filter_map(body).collect()
+    }
+
     /// The ways of all solids through a tick that begins at a time and has a length, in s. What is not drawn at an instant stays where it was before.
     pub(crate) fn paths(&self, begin: f64, length: f64) -> Vec<Path> {
         self.first
@@ -202,12 +212,22 @@ impl Watch {
     }
 }
 
-fn path(first: &Drawn, later: &[Option<Vec<Vector>>; 3], (begin, length): (f64, f64)) -> Option<Path> {
+fn path(first: &Drawn, later: &[Option<Vec<Vector>>; 3], span: (f64, f64)) -> Option<Path> {
+    let (balls, middle, course) = course(first, later, span);
+    let (points, radius) = rounded(&balls);
+    let shape = Shape::rounded(points.iter().map(|point| point - middle).collect(), radius).ok()?;
+    Some(Path { origin: first.origin, shape, course })
+}
+
+/// The balls of a drawing that are corners, the middle of them, and its way.
+fn course(
+    first: &Drawn,
+    later: &[Option<Vec<Vector>>; 3],
+    span: (f64, f64),
+) -> (Vec<(Vector, f64)>, Vector, Course) {
     let chosen = corners(&first.balls);
     let balls: Vec<(Vector, f64)> = chosen.iter().map(|i| first.balls[*i]).collect();
     let middle = balls.iter().map(|(point, _)| point).sum::<Vector>() / balls.len().max(1) as f64;
-    let (points, radius) = rounded(&balls);
-    let shape = Shape::rounded(points.iter().map(|point| point - middle).collect(), radius).ok()?;
     let (mut centres, mut turns) = ([middle; 4], [Vector::zeros(); 4]);
     for k in 0..3 {
         (centres[k + 1], turns[k + 1]) = (centres[k], turns[k]);
@@ -217,8 +237,7 @@ fn path(first: &Drawn, later: &[Option<Vec<Vector>>; 3], (begin, length): (f64, 
             turns[k + 1] = rotation(&pairs, [middle, centres[k + 1]], turns[k]);
         }
     }
-    let (centre, turn) = (Cubic::through(centres), Cubic::through(turns));
-    Some(Path { origin: first.origin, shape, begin, length, centre, turn })
+    (balls, middle, Course::through(span, centres, turns))
 }
 
 /// The rotation vector that leads from places about one centre to places about another, as near as that is possible. `guess` is one for an instant before.

@@ -23,6 +23,7 @@ use nalgebra::Vector3;
 use crate::coupled;
 use crate::descent::Descent;
 use crate::motion::MOST_TICKS;
+use crate::paths::Meets;
 use crate::place::Place;
 use crate::points::{Pair, RigidMotion, directions, outermost, rigid_motion};
 use crate::{CLOCK, Error};
@@ -179,7 +180,8 @@ impl Track<'_> {
             past.into_iter().flatten().enumerate().map(|(i, body)| (body.id, i)).collect();
         if drawn.len() > MOST_BODIES {
             let span = self.span(solids, &drawn[MOST_BODIES]);
-            return Err(Error::TooManySolids { most: MOST_BODIES, time: self.string.time, span });
+            let meets = Meets::Wind;
+            return Err(Error::TooManySolids { most: MOST_BODIES, time: self.string.time, meets, span });
         }
         let mut bodies = Vec::with_capacity(drawn.len());
         for solid in &drawn {
@@ -187,7 +189,7 @@ impl Track<'_> {
                 let kind = solids.model.kinds.get(solid.origin.kind).name.clone();
                 let (span, lineage) = (self.span(solids, solid), solid.origin.lineage);
                 let falls = passive == Passive::Falls;
-                let meets = false;
+                let meets = Meets::Wind;
                 return Err(Error::PassiveSolid {
                     kind,
                     lineage,

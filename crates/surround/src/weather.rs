@@ -13,6 +13,7 @@ use dlsys_wind::{
 };
 use nalgebra::Vector3;
 
+use crate::obstacles::Obstacles;
 use crate::solids::Solids;
 use crate::{Error, Place};
 
@@ -20,6 +21,8 @@ use crate::{Error, Place};
 pub struct Weather<'m> {
     declared: Arc<Declared>,
     solids: Option<Arc<Solids<'m>>>,
+    /// The same bodies in the way of what falls.
+    obstacles: Option<Arc<Obstacles<'m>>>,
     /// The last instants with bodies.
     recent: Recent,
 }
@@ -119,7 +122,8 @@ impl<'m> Weather<'m> {
     pub fn of(model: &'m Model, settings: Settings) -> Result<Option<Arc<Weather<'m>>>, Error> {
         let Some(declared) = Declared::of(&model.scenery)? else { return Ok(None) };
         let solids = Solids::new(model, settings)?.map(Arc::new);
-        Ok(Some(Arc::new(Weather { declared, solids, recent: Recent::default() })))
+        let obstacles = Obstacles::new(model, settings).map(Arc::new);
+        Ok(Some(Arc::new(Weather { declared, solids, obstacles, recent: Recent::default() })))
     }
 
     /// The wind and the flows that a model declares, whatever bodies it has; `None` if it declares neither.
@@ -131,7 +135,9 @@ impl<'m> Weather<'m> {
             return Ok(None);
         }
         let declared = Declared::of(scenery)?;
-        let weather = |declared| Arc::new(Weather { declared, solids: None, recent: Recent::default() });
+        let weather = |declared| {
+            Arc::new(Weather { declared, solids: None, obstacles: None, recent: Recent::default() })
+        };
         Ok(declared.map(weather))
     }
 
@@ -141,7 +147,9 @@ impl<'m> Weather<'m> {
             return Err(Error::SolidInLoop { span: *span });
         }
         let declared = Declared::of(scenery)?;
-        let weather = |declared| Arc::new(Weather { declared, solids: None, recent: Recent::default() });
+        let weather = |declared| {
+            Arc::new(Weather { declared, solids: None, obstacles: None, recent: Recent::default() })
+        };
         Ok(declared.map(weather))
     }
 
@@ -154,7 +162,8 @@ impl<'m> Weather<'m> {
             Some(eddy) if size > NOTHING * eddy => Declared::new(scenery, self.declared.spans.wind, size)?,
             _ => Arc::clone(&self.declared),
         };
-        Ok(Weather { declared, solids: self.solids.clone(), recent: Recent::default() })
+        let (solids, obstacles) = (self.solids.clone(), self.obstacles.clone());
+        Ok(Weather { declared, solids, obstacles, recent: Recent::default() })
     }
 
     /// The field without bodies.
@@ -280,6 +289,11 @@ impl<'m> Sampler<'m> {
     /// The wind for a model at a place; without weather the air is still.
     pub fn new(weather: Option<Arc<Weather<'m>>>, place: Place) -> Sampler<'m> {
         Sampler { weather, last: Mutex::default(), failure: Mutex::default(), place }
+    }
+
+    /// The solids in the way of what falls, if there are any.
+    pub(crate) fn obstacles(&self) -> Option<&Obstacles<'m>> {
+        self.weather.as_ref()?.obstacles.as_deref()
     }
 
     /// True if the air moves somewhere at some time.

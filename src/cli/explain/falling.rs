@@ -181,9 +181,16 @@ fn row(
             format!("nothing that has been let go is drawn at {when}"),
         );
     }
-    let ends = match scene.scenery.ground.is_some() || scene.scenery.bed.is_some() {
-        true => "until it lies still on the ground; from then on there is nothing to do",
-        false => "without end, because there is no `ground`",
+    let has_ground = scene.scenery.ground.is_some() || scene.scenery.bed.is_some();
+    let ends = match (scene.scenery.solids.is_empty(), has_ground) {
+        (true, true) => "until it lies still on the ground; from then on there is nothing to do",
+        (true, false) => "without end, because there is no `ground`",
+        (false, true) => {
+            "until it lies still on the ground or on a body that is `solid`; while that stands still there is nothing to do"
+        }
+        (false, false) => {
+            "until it lies still on a body that is `solid`, while that stands still; beside them without end, because there is no `ground`"
+        }
     };
     let ticks = brief((t * second / CLOCK).ceil(), 6);
     let why = format!(

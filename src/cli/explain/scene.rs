@@ -95,14 +95,27 @@ fn solid(model: &Model) -> Option<ScenePart> {
                     "sheets meet the convex hull of each body on the way on which the equations of the model lead it"
                 }
             };
+            let falls = match lets_go(model) {
+                true => "; what is let go meets the convex hull of each body, and does not push it",
+                false => "",
+            };
+            let unfelt = match lets_go(model) && model.reads_force() {
+                true => ": warning: its rules read the force of sheets, of which what falls is no part",
+                false => "",
+            };
             let why = match (sways(model) || turtle::lets_out(model), turtle::drapes(model)) {
                 (true, true) => format!("{around}; {met}"),
                 (true, false) => around.to_owned(),
                 (false, _) => met.to_owned(),
             };
-            Some(ScenePart::new(part, "in steps", why))
+            Some(ScenePart::new(part, "in steps", why + falls + unfelt))
         }
     }
+}
+
+/// True if a model, or a plant in it, may let go of something (`@D`).
+fn lets_go(model: &Model) -> bool {
+    turtle::lets_go(model) || model.scenery.plants.iter().any(|plant| lets_go(&plant.model))
 }
 
 /// Units, wind, flows and tissues.

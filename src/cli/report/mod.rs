@@ -150,7 +150,7 @@ const PASSES: u64 = 100;
 /// Exact cases, hard cases and speed of wind, stems, bodies that fall, gases, sheets and ground. Each table is printed when it is complete.
 fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     let defect = |error: String| Failure::Model(format!("error: {error}\n"));
-    let mut progress = Progress::of_printed("surroundings", 18);
+    let mut progress = Progress::of_printed("surroundings", 19);
     let mut show = |table: String| {
         progress.inc();
         progress.suspend(|| print(&format!("{table}\n")))
@@ -174,6 +174,8 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     show(study::exact_fall_table(&falls))?;
     let landings = study::Landings::new(THROWS).map_err(|error| defect(error.to_string()))?;
     show(landings.table())?;
+    let contacts = study::Contacts::new(THROWS);
+    show(contacts.table())?;
     let mut gases = Vec::new();
     for case in crate::gas::study::EXACT_CASES {
         gases.extend(case().map_err(|error| defect(error.to_string()))?);
@@ -224,6 +226,7 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
         + random.iter().filter(|case| case.failure.is_some()).count()
         + driven.iter().filter(|case| case.failure.is_some()).count()
         + landings.failed()
+        + contacts.failed()
         + passes.failed();
     match bad + failed {
         0 => Ok(()),

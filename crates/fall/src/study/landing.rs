@@ -4,10 +4,10 @@ use dlsys_wind::study::Convergence;
 
 use super::TOLERANCES;
 use crate::motion::turn;
-use crate::{Air, Body, Error, Fall, Ground, Motion, Settings, Still, Vector};
+use crate::{Air, Body, Error, Fall, Ground, Motion, Open, Settings, Still, Vector};
 
 /// Settings without air.
-fn vacuum(tolerance: f64) -> Settings {
+pub(super) fn vacuum(tolerance: f64) -> Settings {
     Settings { tolerance, air: Air { density: 0.0, ..Air::default() }, ..Settings::default() }
 }
 
@@ -101,7 +101,7 @@ pub fn contact_energy() -> Result<Vec<Convergence>, Error> {
             let (body, release, ground) = throw(seed)?;
             let mut fall = Fall::new(body, release, 0.0, Some(ground), vacuum(tolerance))?;
             let start = fall.energy(&release).iter().sum::<f64>();
-            while let Some(part) = fall.part(10.0, &Still)? {
+            while let Some(part) = fall.part(10.0, &Still, &Open)? {
                 let [before, within, after] = [part.before, part.within, part.after]
                     .map(|motion| fall.energy(&motion).iter().sum::<f64>());
                 if part.flight {
@@ -121,7 +121,7 @@ pub fn contact_energy() -> Result<Vec<Convergence>, Error> {
 }
 
 /// A number in 0..1 from a seed and a purpose.
-fn chance(seed: u64, purpose: u64) -> f64 {
+pub(super) fn chance(seed: u64, purpose: u64) -> f64 {
     // The mixing function of splitmix64 (Steele, Lea, Flood, 2014).
     let mut z = (seed << 8 | purpose).wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -130,7 +130,7 @@ fn chance(seed: u64, purpose: u64) -> f64 {
 }
 
 /// A plate or a lump with a random motion above a floor at height 0.
-fn throw(seed: u64) -> Result<(Body, Motion, Ground), Error> {
+pub(super) fn throw(seed: u64) -> Result<(Body, Motion, Ground), Error> {
     let x = |purpose: u64| chance(seed, purpose);
     let spread = |purpose: u64, size: f64| (2.0 * x(purpose) - 1.0) * size;
     let half = [0.004 + 0.03 * x(0), 0.004 + 0.03 * x(1)];

@@ -4,19 +4,24 @@ use dlsys_wind::study::Convergence;
 
 use crate::Error;
 
+mod contact;
+mod courses;
 mod flight;
 mod landing;
+mod passes;
 mod planar;
 
+pub use contact::{bounce_on_plate, carry, moving_plate, parabola, slope};
 pub use flight::{broadside, broadside_steps, flutter, terminal_speed, tumble};
 pub use landing::{RandomLanding, bounce, contact_energy, random_landing, roll, slide, slide_in_air};
+pub use passes::{RandomContact, random_contact};
 pub use planar::{Planar, planar_flutter, planar_tumble};
 
 /// A case: computes its rows.
 pub type Case = fn() -> Result<Vec<Convergence>, Error>;
 
 /// The exact cases.
-pub const EXACT_CASES: [Case; 10] = [
+pub const EXACT_CASES: [Case; 15] = [
     terminal_speed,
     broadside,
     broadside_steps,
@@ -27,6 +32,11 @@ pub const EXACT_CASES: [Case; 10] = [
     slide_in_air,
     roll,
     contact_energy,
+    parabola,
+    moving_plate,
+    bounce_on_plate,
+    carry,
+    slope,
 ];
 
 /// The tolerances of the study. A step of an eighth has an error of 1/512, and lengths of steps are powers of 2.

@@ -4,17 +4,17 @@
 //! places that points and solids will have after a part of the step. So steps
 //! are as long as motion allows, not as short as the stiffness of the contact requires.
 
+mod grip;
 mod impact;
 mod led;
-mod nearest;
-mod shape;
 
 use crate::error::check;
 use crate::{Error, Matrix, Sheet, Vector};
+pub use dlsys_solid::{Gap, Place, Shape};
+pub use grip::Grip;
+pub(crate) use grip::press;
 pub(crate) use impact::{Impact, Moving};
 pub use led::Led;
-pub(crate) use shape::press;
-pub use shape::{Gap, Grip, Place, Shape};
 
 /// What moves a solid.
 #[derive(Clone, Copy)]

@@ -1,7 +1,7 @@
-//! Solids: their shapes, their places, and the gap between a solid and points, cords and faces.
+//! Shapes and places of solids, and the gap between a solid and points, cords and faces.
 
-use super::nearest::nearest;
 use crate::error::check;
+use crate::nearest::nearest;
 use crate::{Attitude, Error, Vector};
 
 /// Where a solid is, and how it moves.
@@ -34,11 +34,16 @@ impl Place {
     }
 
     /// The place after a way in m and a turn by a rotation vector about the axes of the world, in rad.
-    pub(crate) fn after(&self, way: Vector, turn: Vector) -> Place {
+    pub fn after(&self, way: Vector, turn: Vector) -> Place {
         Place { position: self.position + way, attitude: turned(turn) * self.attitude, ..*self }
     }
 
-    pub(crate) fn check(&self) -> Result<(), Error> {
+    /// Checks that it is finite.
+    ///
+    /// # Errors
+    ///
+    /// A component that is not a finite number.
+    pub fn check(&self) -> Result<(), Error> {
         let vectors = [self.position, self.velocity, self.spin];
         let values = vectors.iter().flat_map(|vector| vector.iter()).chain(self.attitude.coords.iter());
         for value in values {
@@ -100,6 +105,16 @@ impl Shape {
     /// No point, coordinates that are not finite, or a radius that is not above 0.
     pub fn rounded(points: Vec<Vector>, radius: f64) -> Result<Shape, Error> {
         check("a radius of a solid (m)", radius, radius > 0.0, "more than 0")?;
+        Shape::hull(points, radius)
+    }
+
+    /// The convex hull of points (m), rounded by a radius in m that may be 0: a polyhedron then, a polygon, or a line.
+    ///
+    /// # Errors
+    ///
+    /// No point, coordinates that are not finite, or a negative radius.
+    pub fn hull(points: Vec<Vector>, radius: f64) -> Result<Shape, Error> {
+        check("a radius of a solid (m)", radius, radius >= 0.0, "0 or more")?;
         check("a number of points of a solid", points.len() as f64, !points.is_empty(), "at least 1")?;
         for coordinate in points.iter().flat_map(|point| point.iter()) {
             check("a coordinate of a solid (m)", *coordinate, true, "a finite number")?;
@@ -126,6 +141,14 @@ impl Shape {
         match &self.0 {
             Form::Round(_, radius, _) => *radius,
             Form::HalfSpace => f64::INFINITY,
+        }
+    }
+
+    /// The points whose hull is rounded; none for a half-space.
+    pub fn core(&self) -> &[Vector] {
+        match &self.0 {
+            Form::Round(core, ..) => core,
+            Form::HalfSpace => &[],
         }
     }
 
@@ -162,7 +185,7 @@ impl Shape {
     }
 
     /// Whether faces and cords are nowhere nearer than their corners.
-    pub(crate) fn is_flat(&self) -> bool {
+    pub fn is_flat(&self) -> bool {
         self.0 == Form::HalfSpace
     }
 }
@@ -170,49 +193,4 @@ impl Shape {
 /// A unit vector towards the mean of points.
 fn middle(points: &[Vector]) -> Vector {
     points.iter().sum::<Vector>().try_normalize(0.0).unwrap_or_else(Vector::y)
-}
-
-/// Forces of a contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Grip {
-    /// Coulomb's coefficient of friction.
-    pub friction: f64,
-    /// Speed in m/s up to which friction is proportional to the speed: what sticks creeps more slowly.
-    pub creep: f64,
-    /// Damping a in s/m: a normal force is `1 - a ġ` times that of the spring while the gap g changes, but not negative (Hunt, Crossley, *Coefficient
-    /// of restitution interpreted as damping in vibroimpact*, J. Appl. Mech. 42, 1975).
-    pub damping: f64,
-    /// Stiffness of a contact, in units of that of the face (E t) or cord (EA/L) which is touched.
-    pub stiffness: f64,
-}
-
-impl Default for Grip {
-    /// A friction of 0.4 above 5 mm/s, a damping of 0.5 s/m, a stiffness of 50.
-    fn default() -> Grip {
-        Grip { friction: 0.4, creep: 5e-3, damping: 0.5, stiffness: 50.0 }
-    }
-}
-
-impl Grip {
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        check("a friction", self.friction, self.friction >= 0.0, "0 or more")?;
-        check("a speed of creep (m/s)", self.creep, self.creep > 0.0, "more than 0")?;
-        check("a damping of contacts (s/m)", self.damping, self.damping >= 0.0, "0 or more")?;
-        check("a stiffness of contacts", self.stiffness, self.stiffness > 0.0, "more than 0")
-    }
-}
-
-/// The force that presses on what is `depth` m in a solid, its slope, and its energy, for a stiffness of 1 N/m: `d/(1 - d/b)²`, a spring that is
-/// stiffer in the depth b and infinite there. It is followed to 0.9 b; steps that come so deep are not taken.
-pub(crate) fn press(depth: f64, most: f64) -> [f64; 3] {
-    if depth <= 0.0 {
-        return [0.0; 3];
-    }
-    if most.is_infinite() {
-        return [depth, 1.0, 0.5 * depth * depth];
-    }
-    let part = (depth / most).min(0.9);
-    let rest = 1.0 - part;
-    let energy = most * most * (1.0 / rest - 1.0 + libm::log(rest));
-    [part * most / (rest * rest), (1.0 + part) / (rest * rest * rest), energy]
 }

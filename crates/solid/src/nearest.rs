@@ -1,4 +1,4 @@
-//! Nearest points of two convex hulls of few points: a point, a cord or a face of a sheet, and the core of a solid.
+//! Nearest points of two convex hulls of points: a point, a cord or a face of a sheet and the core of a solid, or two solids.
 
 use crate::Vector;
 
@@ -65,16 +65,75 @@ impl Simplex {
 /// By the method of Gilbert, Johnson and Keerthi (*A fast procedure for computing the distance between complex objects in three-dimensional space*,
 /// 1988). There are one to three corners of the first hull.
 pub(crate) fn nearest(corners: &[Vector], core: &[Vector]) -> Nearest {
+    let (way, simplex) = approach(corners, core);
+    let mut weights = [0.0; 3];
+    for k in 0..simplex.count {
+        weights[simplex.corners[k].index] += simplex.weights[k];
+    }
+    let sum: f64 = weights.iter().sum();
+    Nearest { way, weights: weights.map(|weight| weight / sum) }
+}
+
+/// Where two hulls are nearest to each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Meeting {
+    /// The shortest way from the second hull to the first one, in m; 0 if they meet.
+    pub way: Vector,
+    /// The point of the first one at its end.
+    pub place: Vector,
+}
+
+impl Meeting {
+    /// Of the hulls of points in common axes; the origin is a hull without points.
+    pub fn of(first: &[Vector], second: &[Vector]) -> Meeting {
+        if first.is_empty() {
+            return Meeting::of(&[Vector::zeros()], second);
+        }
+        let (way, simplex) = approach(first, second);
+        let (mut place, mut sum) = (Vector::zeros(), 0.0);
+        for k in 0..simplex.count {
+            place += first[simplex.corners[k].index] * simplex.weights[k];
+            sum += simplex.weights[k];
+        }
+        Meeting { way: simplex.across(way), place: place / sum }
+    }
+}
+
+impl Simplex {
+    /// The way to the nearest point, across the triangle or the edge that it lies in. Where hulls are much larger than their distance, the difference of two
+    /// points has too large an error for a direction; edges have none.
+    fn across(&self, way: Vector) -> Vector {
+        let place = |k: usize| self.corners[k].place;
+        let axis = match self.count {
+            2 => {
+                let edge = place(1) - place(0);
+                way - edge * (way.dot(&edge) / edge.norm_squared())
+            }
+            3 => {
+                let normal = (place(1) - place(0)).cross(&(place(2) - place(0)));
+                if normal.dot(&way) < 0.0 { -normal } else { normal }
+            }
+            _ => return way,
+        };
+        let Some(axis) = axis.try_normalize(0.0) else { return way };
+        let distance = axis.dot(&place(0));
+        // Corners that are nearly in one line do not tell it.
+        if distance > 0.999 * way.norm() && distance < 1.001 * way.norm() { axis * distance } else { way }
+    }
+}
+
+/// The shortest way from the second hull to the first one, and the differences of corners that it lies among. The first one has a corner.
+fn approach(first: &[Vector], second: &[Vector]) -> (Vector, Simplex) {
     let difference = |direction: Vector| {
         let along = |point: &Vector| point.dot(&direction);
-        let first = (0..corners.len()).min_by(|a, b| along(&corners[*a]).total_cmp(&along(&corners[*b])));
-        let second = core.iter().max_by(|a, b| along(a).total_cmp(&along(b)));
-        let index = first.unwrap_or(0);
-        Corner { place: corners[index] - second.copied().unwrap_or_else(Vector::zeros), index }
+        let lowest = (0..first.len()).min_by(|a, b| along(&first[*a]).total_cmp(&along(&first[*b])));
+        let highest = second.iter().max_by(|a, b| along(a).total_cmp(&along(b)));
+        let index = lowest.unwrap_or(0);
+        Corner { place: first[index] - highest.copied().unwrap_or_else(Vector::zeros), index }
     };
-    let first = difference(Vector::zeros());
-    let mut simplex = Simplex { corners: [first; 4], weights: [1.0; 4], count: 1 };
-    let mut way = first.place;
+    let begin = difference(Vector::zeros());
+    let mut simplex = Simplex { corners: [begin; 4], weights: [1.0; 4], count: 1 };
+    let mut way = begin.place;
     for _ in 0..STEPS {
         let next = difference(way);
         let gain = way.norm_squared() - next.place.dot(&way);
@@ -94,12 +153,7 @@ pub(crate) fn nearest(corners: &[Vector], core: &[Vector]) -> Nearest {
             break;
         }
     }
-    let mut weights = [0.0; 3];
-    for k in 0..simplex.count {
-        weights[simplex.corners[k].index] += simplex.weights[k];
-    }
-    let sum: f64 = weights.iter().sum();
-    Nearest { way, weights: weights.map(|weight| weight / sum) }
+    (way, simplex)
 }
 
 /// Weights of the foot of the perpendicular from the origin, if it lies between the ends.
@@ -175,5 +229,36 @@ mod tests {
                 assert!(cube.iter().all(|point| level(point) < -distance + 1e-7));
             }
         }
+    }
+
+    /// Two boxes that are turned against each other: no point of either is beyond the planes across the way.
+    #[test]
+    fn two_hulls_are_parted_by_planes_across_the_way() {
+        let mut number = numbers();
+        let mut met = 0;
+        for _ in 0..2000 {
+            let mut vector = || Vector::new(number(), number(), number());
+            let mut made = |size: f64| {
+                let (middle, turn) = (vector() * 2.0, crate::Attitude::from_scaled_axis(vector() * 3.0));
+                // Flat ones, too.
+                let half = vector().map(|x| if x < -0.5 { 0.0 } else { x.abs() * size });
+                let sign = |k: usize, bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
+                let corner =
+                    |k| middle + turn * half.component_mul(&Vector::new(sign(k, 0), sign(k, 1), sign(k, 2)));
+                (0..8).map(corner).collect::<Vec<_>>()
+            };
+            let (first, second) = (made(1.0), made(1.5));
+            let Meeting { way, place } = Meeting::of(&first, &second);
+            let distance = way.norm();
+            met += usize::from(distance == 0.0);
+            if distance > 0.0 {
+                let level = |point: &Vector| (point - place).dot(&way) / distance;
+                let least = first.iter().map(level).fold(f64::INFINITY, f64::min);
+                let most = second.iter().map(level).fold(f64::NEG_INFINITY, f64::max);
+                assert!(least > -1e-7 && most < -distance + 1e-7, "{least} {most} {distance}");
+                assert!((Meeting::of(&second, &first).way + way).norm() < 1e-7);
+            }
+        }
+        assert!(met > 50 && met < 1500, "{met}");
     }
 }
