@@ -228,7 +228,7 @@ fn bottom(scene: &Scene) -> f64 {
 const BOARD: &str = "solid Board\nground 0\ncurve tip = (0, 0) (3, 0) (3.5, 80) (9, 80)\n\
     initial string: Board [ f(1.5) -(90) f(0.3) +(90) P ]\nP: if age = 0.2 produce @D Q\n\
     interpret P: &(80) @P(0.1, 0.08)\ninterpret Q: &(80) @P(0.1, 0.08)\n\
-    interpret Board: f(1) -(90) -(tip(t)) f(-1) for i in 0 .. 2: ( [ &(90) f(0.1*i - 0.1) ^(90) !(0.1) F(2) ] )\n";
+    interpret Board: [ f(1) -(90) -(tip(t)) f(-1) for i in 0 .. 2: ( [ &(90) f(0.1*i - 0.1) ^(90) !(0.1) F(2) ] ) ]\n";
 
 #[test]
 fn what_falls_lies_on_a_solid_and_slides_off_when_it_tips() {
