@@ -290,3 +290,22 @@ fn the_hard_cases_hold() {
     let verdicts = table.lines().filter(|line| line.ends_with("  pass")).count();
     assert!(verdicts >= 250, "{table}");
 }
+
+/// Of what falls and hangs, tighter tolerances have smaller errors.
+#[test]
+fn scenes_are_studied_by_tolerance() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let model = folder.path().join("drop.dls");
+    let text = "units length 0.1, time 1\nwind 1, 0, 0 speed 1\nground 0\nsolid Board\nframes 0 .. 0.5 step 0.1\n\
+        initial string: [ Hang ] [ f(2) -(80) Board ]\nHang: if age = 0.2 produce @D Loose\n\
+        interpret Hang: Petal\ninterpret Loose: Petal\ninterpret Petal: f(6) &(40) @P(1)\ninterpret Board: !(0.5) F(4)\n";
+    std::fs::write(&model, text).expect("written");
+    let out = folder.path().to_str().expect("UTF-8");
+    let table = good(&[model.to_str().expect("UTF-8"), "--methods", "auto", "-o", out]);
+    assert!(table.contains("what falls and hangs, at 6 times, against 1e-6"), "{table}");
+    let lines = fields(&read(&folder.path().join("drop-scene.csv")));
+    let errors: Vec<f64> =
+        column(&lines, "error").iter().map(|text| text.parse().expect("a number")).collect();
+    assert_eq!(errors.len(), 4);
+    assert!(errors[3] < 0.03 * errors[0] && errors[3] < 1e-3, "{errors:?}");
+}

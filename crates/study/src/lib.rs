@@ -13,7 +13,7 @@
 //! - `table`, `files`, `plot`: a study as text, as CSV and JSON, and as a picture; `axis`, `diagram`: parts that plots share.
 //! - `spread`, `band`: the distribution of measures over many specimens, as tables and as a plot.
 //! - `verify`: a run computed again in an independent way.
-//! - `stems`: error of drawn positions against work for stems that bend; `surroundings`, `falls`, `gases`, `sheets`, `grounds`: exact cases and
+//! - `stems`, `passive`: error of drawn positions against work for stems that bend, and for what falls and hangs; `surroundings`, `falls`, `gases`, `sheets`, `grounds`: exact cases and
 //!   speed of wind, stems, bodies that fall, gases, sheets and ground.
 //! - `coupling`: forces of the passive parts of a model on the active ones, and which coupling serves.
 //! - `case`, `hard`, `cases`: models with exact answers in their first lines.
@@ -36,6 +36,7 @@ mod gases;
 mod grounds;
 mod hard;
 mod order;
+mod passive;
 mod plot;
 mod record;
 mod reference;
@@ -63,6 +64,7 @@ pub use gases::{exact_gas_table, gas_speed_table};
 pub use grounds::{exact_ground_table, ground_rule_table, ground_speed_table};
 pub use hard::{CaseResult, HardPlan, Mismatch, run_case};
 pub use order::{nominal_order, observed_order};
+pub use passive::{PassivePoint, PassiveStudy, passive_csv, passive_study, passive_table};
 pub use plot::svg;
 pub use record::{Accuracy, EarlyEnd, Record, Setup, Task, method_name};
 pub use reference::{Reference, References};

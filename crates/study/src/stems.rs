@@ -116,7 +116,7 @@ pub fn stem_study(
         .map(|(bending, track)| {
             let result = track.as_ref().map_err(String::clone);
             let outcome = |track: &Track| StemOutcome {
-                error: distance(&track.frames, &best.frames),
+                error: relative_distance(&track.frames, &best.frames),
                 seconds: track.seconds,
                 effort: track.effort,
             };
@@ -167,7 +167,7 @@ fn points(scene: &Scene) -> Vec<Point> {
 }
 
 /// The largest distance of two points of a frame, relative to the extent of the whole.
-fn distance(frames: &[Vec<Point>], reference: &[Vec<Point>]) -> f64 {
+pub(crate) fn relative_distance(frames: &[Vec<Point>], reference: &[Vec<Point>]) -> f64 {
     let mut low = [f64::INFINITY; 3];
     let mut high = [f64::NEG_INFINITY; 3];
     for point in reference.iter().flatten() {

@@ -110,6 +110,7 @@ fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure
         ))
     })?;
     stems(args, session, name, &plan)?;
+    passive(args, session, name, &plan)?;
     print("\n")?;
     let Some(out) = &args.out else { return Ok(()) };
     write(out, &format!("{name}.csv"), &study::csv(&study))?;
@@ -132,6 +133,31 @@ fn stems(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Resul
     print(&study::stem_table(&study))?;
     match &args.out {
         Some(out) => write(out, &format!("{name}-stems.csv"), &study::stem_csv(&study)),
+        None => Ok(()),
+    }
+}
+
+/// Studies the tolerance on a scene in which something falls or hangs.
+fn passive(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Result<(), Failure> {
+    let mut progress = Progress::new("scene", 5);
+    let study = study::passive_study(session, &plan.times, plan.base, plan.time_limit, &mut |what| {
+        progress.say(format!("{name}: what falls and hangs by {what}"));
+        progress.inc();
+    });
+    drop(progress);
+    let study = match study {
+        Ok(Some(study)) => study,
+        Ok(None) => return Ok(()),
+        // Growth has been studied all the same.
+        Err(why) => {
+            return print(&format!(
+                "\nwhat falls and hangs: no run came to the last time\n  {why}\n  (`--time-limit S` gives each run more time, `--at` fewer)\n"
+            ));
+        }
+    };
+    print(&study::passive_table(&study))?;
+    match &args.out {
+        Some(out) => write(out, &format!("{name}-scene.csv"), &study::passive_csv(&study)),
         None => Ok(()),
     }
 }
