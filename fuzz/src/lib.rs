@@ -10,8 +10,11 @@ use dlsys::session::Session;
 use dlsys::sim::{Settings, Simulation};
 use dlsys::tree::ModuleString;
 
+/// What is run on an input.
+pub type Target = fn(&[u8]);
+
 /// The targets by name.
-pub const TARGETS: [(&str, fn(&[u8])); 5] =
+pub const TARGETS: [(&str, Target); 5] =
     [("front", front), ("format", format), ("simulate", simulate), ("draw", draw), ("files", files)];
 
 fn source(bytes: &[u8]) -> Option<Source> {

@@ -55,7 +55,8 @@ pub fn passive_study(
     say: &mut dyn FnMut(&str),
 ) -> Result<Option<PassiveStudy>, String> {
     let model = &session.model;
-    if times.is_empty() || !(turtle::lets_go(model) || !model.scenery.sheets.is_empty()) {
+    let is_passive = turtle::lets_go(model) || !model.scenery.sheets.is_empty();
+    if times.is_empty() || !is_passive {
         return Ok(None);
     }
     let mut tracks = Vec::new();
