@@ -26,6 +26,7 @@ mod afloat;
 mod bending;
 mod body;
 mod classes;
+mod columns;
 mod coupled;
 mod course;
 mod descent;

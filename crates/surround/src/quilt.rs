@@ -7,10 +7,11 @@ use dlsys_ground as ground;
 use dlsys_tree::Lineage;
 
 use crate::Error;
+use crate::columns::from_metres;
 use crate::motion::Motion;
 use crate::picture::Earth;
 use crate::spray::with_spray;
-use crate::terrain::{TICKS, Terrain, from_metres};
+use crate::terrain::{TICKS, Terrain};
 
 /// The name of ground in files.
 const NAME: &str = "ground";

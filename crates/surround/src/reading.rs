@@ -11,8 +11,9 @@ use dlsys_sim::GroundRule;
 use dlsys_wind::Eddies;
 use nalgebra::Vector3;
 
+use crate::columns;
 use crate::layers::Layers;
-use crate::terrain::{self, TICKS};
+use crate::terrain::TICKS;
 use crate::{Error, Place, Weather};
 
 /// Puts the wind and the ground where the expressions of a model read them; [`start`](crate::start) does so, too. Without it they have no value.
@@ -43,7 +44,7 @@ pub(crate) fn layers(model: &Model) -> Result<Option<Arc<Layers>>, Error> {
         return Ok(None);
     }
     let place = Place::of_scene(&model.scenery);
-    let Some(ground) = terrain::ground(model, &place, 1, GroundRule::Law)? else { return Ok(None) };
+    let Some(ground) = columns::ground(model, &place, 1, GroundRule::Law)? else { return Ok(None) };
     let tick = 1.0 / (TICKS * place.units.time);
     model.scenery.layers.get_or_make(|| Ok(Arc::new(Layers::new(ground, (place.units.length, tick)))))
 }

@@ -3,8 +3,8 @@
 use dlsys_geometry::scene;
 use dlsys_ground as ground;
 
+use crate::columns::from_metres;
 use crate::picture::{Earth, Picture};
-use crate::terrain::from_metres;
 
 /// Of the normal of a particle that does not point up.
 const OWN: f64 = 0.4;

@@ -13,14 +13,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use dlsys_diagnostic::Span;
-use dlsys_geometry::scene::{self, Point, Scene};
+use dlsys_geometry::scene::{self, Scene};
 use dlsys_geometry::turtle;
-use dlsys_ground::{self as ground, Description, Extent, Ground};
-use dlsys_model::{Bed, Model, Soil, SoilBase};
-use dlsys_sim::{GroundRule, Inputs, Settings, Simulation};
+use dlsys_ground::{self as ground, Ground};
+use dlsys_model::Model;
+use dlsys_sim::{Inputs, Settings, Simulation};
 use dlsys_tree::ModuleString;
 
 use crate::Error;
+use crate::columns;
 use crate::coupled;
 use crate::descent::Descent;
 use crate::layers::{Layer, Layers};
@@ -36,10 +37,6 @@ use crate::spray::with_spray;
 pub const TICKS: f64 = 120.0;
 /// A time that is short of a tick by this part of one counts as the tick: a rounding of frames of 24, 30, or 60 in a second.
 const SLACK: f64 = 1e-6;
-/// Height of the soil above what does not give way, in columns, where the text gives no `depth`.
-const DEEP: f64 = 10_000.0;
-/// Memory for columns that have been touched, in MB.
-const MEMORY: usize = 1024;
 /// Most columns of the moments that are kept because they were asked for, and of marks.
 const MOST_KEPT: usize = 4_000_000;
 /// Patches of bodies are as near to theirs as this part of a column.
@@ -136,7 +133,7 @@ impl<'m> Terrain<'m> {
     pub fn new(model: &'m Model, settings: Settings, threads: usize) -> Result<Option<Terrain<'m>>, Error> {
         let place = Place::of_scene(&model.scenery);
         reading::bind(model)?;
-        let Some(ground) = self::ground(model, &place, threads, settings.ground_rule)? else {
+        let Some(ground) = columns::ground(model, &place, threads, settings.ground_rule)? else {
             return Ok(None);
         };
         let settings = Settings { log: true, transitions: false, ..settings };
@@ -526,41 +523,6 @@ impl<'m> Terrain<'m> {
     }
 }
 
-/// Points in m in units of the model.
-pub(crate) fn from_metres(points: &[ground::Vector], metre: f64) -> Vec<Point> {
-    points.iter().map(|point| Point::from(point / metre)).collect()
-}
-
-/// The ground of a model at the beginning; `None` if none is declared that gives way.
-///
-/// # Errors
-/// Values that are out of range.
-pub(crate) fn ground(
-    model: &Model,
-    place: &Place,
-    threads: usize,
-    rule: GroundRule,
-) -> Result<Option<Ground>, Error> {
-    let Some(bed) = &model.scenery.bed else { return Ok(None) };
-    let metre = place.units.length;
-    let description = describe(bed, &model.scenery.soils[bed.soil], metre);
-    let settings = ground::Settings {
-        tick: 1.0 / TICKS,
-        threads: threads.clamp(1, 1024),
-        memory: MEMORY,
-        slides: bed.texture.is_some(),
-        rule: match rule {
-            GroundRule::Law => ground::Rule::Law,
-            GroundRule::Sumner => ground::Rule::Sumner,
-            GroundRule::Sandbox => ground::Rule::Sandbox,
-            GroundRule::Li => ground::Rule::Li,
-        },
-        ..ground::Settings::default()
-    };
-    let made = Ground::new(description, settings);
-    made.map(Some).map_err(|error| Error::Ground { error, time: 0.0, metre, span: bed.span })
-}
-
 /// The largest difference of the heights of two states of a ground, in m.
 fn distance(one: &Ground, other: &Ground) -> f64 {
     let mut most = 0.0_f64;
@@ -572,46 +534,4 @@ fn distance(one: &Ground, other: &Ground) -> f64 {
         }
     }
     most
-}
-
-/// The columns that a declaration describes, in SI.
-fn describe(bed: &Bed, soil: &Soil, metre: f64) -> Description {
-    let cell = bed.cell * metre;
-    let depth = bed.depth.map_or(DEEP * cell, |depth| depth * metre);
-    let last = (bed.extent / bed.cell).round() as i32;
-    let declared = bed.clone();
-    let height = move |x: f64, z: f64| declared.surface(x / metre, z / metre) * metre - depth;
-    let flat = bed.height.level().map(|height| ground::Relief::Level(height * metre - depth));
-    Description {
-        cell,
-        extent: Extent::around(last),
-        soil: material(soil),
-        bed: flat.unwrap_or_else(|| ground::Relief::function(height)),
-        depth: ground::Relief::Level(depth),
-    }
-}
-
-/// A soil with what it has of its base.
-fn material(soil: &Soil) -> ground::Soil {
-    let base = match soil.base {
-        SoilBase::Sand => ground::Soil::sand(),
-        SoilBase::Mud => ground::Soil::mud(),
-        SoilBase::Snow => ground::Soil::snow(),
-        SoilBase::Soil => ground::Soil::earth(),
-    };
-    let repose = soil.repose.unwrap_or(base.repose);
-    ground::Soil {
-        repose,
-        // What is pressed stands no less steep.
-        inner: soil.inner.unwrap_or(base.inner.max(repose)),
-        push: soil.push.unwrap_or(base.push),
-        rough: soil.rough.unwrap_or(base.rough),
-        flow: soil.flow.unwrap_or(base.flow),
-        cohesion: soil.cohesion.unwrap_or(base.cohesion),
-        weight: soil.weight.unwrap_or(base.weight),
-        swell: soil.swell.unwrap_or(base.swell),
-        stick: soil.stick.unwrap_or(base.stick),
-        shed: soil.shed.unwrap_or(base.shed),
-        grain: soil.grain,
-    }
 }
