@@ -153,15 +153,7 @@ impl Rules {
             let velocity = motion.velocity + motion.world_spin().cross(arm) - surface;
             velocity.dot(normal) < slow
         });
-        let phase = if stays { Phase::Contact } else { Phase::Flight };
-        State {
-            motion,
-            phase,
-            impacts: state.impacts.saturating_add(1),
-            calm: 0.0,
-            rate: None,
-            ..state.clone()
-        }
+        state.struck(motion, stays)
     }
 
     /// A step in contact, with solids, with the ground, or with both.

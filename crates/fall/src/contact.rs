@@ -33,15 +33,7 @@ impl Rules {
             let velocity = motion.velocity + motion.world_spin().cross(&arm);
             ground.gap(&motion, contact) <= near && velocity.y < slow
         });
-        let phase = if stays { Phase::Contact } else { Phase::Flight };
-        State {
-            motion,
-            phase,
-            impacts: state.impacts.saturating_add(1),
-            calm: 0.0,
-            rate: None,
-            ..state.clone()
-        }
+        state.struck(motion, stays)
     }
 
     /// Level of the steps in contact.

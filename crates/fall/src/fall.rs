@@ -40,6 +40,15 @@ pub(crate) struct State {
     pub(crate) halted: bool,
 }
 
+impl State {
+    /// The state after an impact, in which some contact may not open.
+    pub(crate) fn struck(&self, motion: Motion, stays: bool) -> State {
+        let phase = if stays { Phase::Contact } else { Phase::Flight };
+        let impacts = self.impacts.saturating_add(1);
+        State { motion, phase, impacts, calm: 0.0, rate: None, ..self.clone() }
+    }
+}
+
 /// What does not change during a fall.
 #[derive(Clone, Debug)]
 pub(crate) struct Rules {

@@ -277,9 +277,11 @@ impl<'m> Flights<'m> {
                 let gusts = Gusts(&self.wind);
                 let obstacles = self.wind.obstacles();
                 let moved = fall.among(time, &gusts, &Among(obstacles)).map_err(|error| {
+                    // An earlier failure of solids is not the reason of another one.
+                    let of_solids = matches!(error, fall::Error::Solids { .. });
+                    let known = obstacles.filter(|_| of_solids).and_then(Obstacles::failure);
                     let failed =
                         Error::falling(model, origin, Some(fall.body()), (error, place.time_at(time)));
-                    let known = obstacles.and_then(Obstacles::failure);
                     known.or_else(|| self.wind.failure()).unwrap_or(failed)
                 })?;
                 (moved.point(*offset), moved.attitude.to_rotation_matrix().into_inner() * *axes)
