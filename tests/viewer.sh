@@ -118,7 +118,7 @@ played=$(open models/lychnis.dls "" '
 echo "Lychnis:"
 echo "$played"
 
-# Stems and meshes, patches, lines, polygons by the thousand, a sheet, gas, ground, nothing at all; orbit and every key.
+# Stems and meshes, patches, lines, polygons by the thousand, a sheet, gas, ground, shadows on a floor, nothing at all; orbit and every key.
 others='
   const player = window.dlsys, canvas = document.getElementById("plant");
   const colours = () => {
@@ -126,7 +126,7 @@ others='
     gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
     return new Set(new Uint32Array(bytes.buffer)).size;
   };
-  for (const key of [..." lpiwasdqe1230[]-+", "End", "ArrowLeft", "ArrowRight", "Home"]) {
+  for (const key of [..." lpiwasdqe1230c[]-+", "End", "ArrowLeft", "ArrowRight", "Home"]) {
     document.dispatchEvent(new KeyboardEvent("keydown", { key }));
     await frame();
   }
@@ -137,11 +137,21 @@ others='
   say(`${colours()} colours, ${player.painter.triangles} triangles, "${document.getElementById("clock").textContent}"`);
   const error = player.painter.gl.getError();
   if (error) throw new Error(`WebGL error ${error}`);
+  // Nothing that is between the light and the floor leaves that as it is.
+  if (player.painter.floor && player.recording.light) {
+    const lit = colours();
+    player.painter.shadows.make(true, () => {});
+    player.painter.shadows.change();
+    player.painter.shadows.make(true, () => {});
+    player.painter.paint(player.camera, canvas.width, canvas.height, true);
+    if (!(colours() < lit)) throw new Error("nothing casts a shadow");
+    say("shadows are cast");
+  }
   const drawn = player.recording.tracks.length > 0 || Boolean(player.recording.clouds);
   if (drawn !== colours() > 1) throw new Error(drawn ? "nothing is to be seen" : "something is to be seen");
   if (drawn === document.getElementById("notice").checkVisibility()) throw new Error("the notice is wrong");'
 printf 'initial string: A(1)\nA(x): solve dx/dt = 1\nframes 0 .. 1 step 0.1\n' > "$work/unseen.dls"
-for model in models/leaf.dls models/campanula.dls models/anabaena.dls models/petal.dls models/abop/koch-island.dls models/scenes/{flag,smoke,steps-sand}.dls "$work/unseen.dls"; do
+for model in models/leaf.dls models/campanula.dls models/anabaena.dls models/petal.dls models/abop/koch-island.dls models/scenes/{flag,smoke,steps-sand,apples}.dls "$work/unseen.dls"; do
     extra=
     case $model in models/scenes/*) extra="--from 0 --to 2 --step 0.25" ;; esac
     [ "$model" != models/campanula.dls ] || extra="--from 0 --to 20 --step 0.5"

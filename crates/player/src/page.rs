@@ -13,26 +13,35 @@ use super::forms::MeshForm;
 use super::recording::Recording;
 use super::stage::Form;
 use super::track::Track;
-use dlsys_geometry::scene::{Material, Texture};
+use dlsys_geometry::scene::{Material, Point, Texture};
 use dlsys_render::{GENERATOR, Spoke};
 
 const PAGE: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/style.css");
 /// The scripts, each after those that it needs.
-const SCRIPTS: [&str; 7] = [
+const SCRIPTS: [&str; 9] = [
     include_str!("page/recording.js"),
     include_str!("page/camera.js"),
     include_str!("page/geometry.js"),
     include_str!("page/clouds.js"),
     include_str!("page/sky.js"),
+    include_str!("page/shadows.js"),
+    include_str!("page/floor.js"),
     include_str!("page/painter.js"),
     include_str!("page/player.js"),
 ];
 
 /// The shaders, by name; without a version, which depends on where they run.
-pub const SHADERS: [(&str, &str); 6] = [
+pub const SHADERS: [(&str, &str); 13] = [
+    ("shade", include_str!("shaders/shade.glsl")),
+    ("open", include_str!("shaders/open.glsl")),
+    ("sun", include_str!("shaders/sun.glsl")),
     ("surface", include_str!("shaders/surface.vert")),
     ("light", include_str!("shaders/light.frag")),
+    ("shadow", include_str!("shaders/shadow.vert")),
+    ("cast", include_str!("shaders/shadow.frag")),
+    ("lawn", include_str!("shaders/floor.vert")),
+    ("floor", include_str!("shaders/floor.frag")),
     ("puff", include_str!("shaders/puff.vert")),
     ("veil", include_str!("shaders/veil.frag")),
     ("sky", include_str!("shaders/sky.vert")),
@@ -132,9 +141,10 @@ fn description(recording: &Recording, outlines: &[Vec<Spoke>]) -> Value {
         "size": [size.x, size.y, size.z],
         "light": light(recording),
         "camera": recording.surroundings.camera.map(|at| {
-            let away = at.eye - at.aim;
-            json!([away.x.atan2(away.z).to_degrees(), away.y.atan2(away.x.hypot(away.z)).to_degrees()])
+            let seen = |point: Point| <[f64; 3]>::from(point - recording.centre);
+            json!({ "eye": seen(at.eye), "aim": seen(at.aim), "angle": at.angle })
         }),
+        "floor": recording.surroundings.floor.map(|height| height - recording.centre.y),
         "shaders": SHADERS.into_iter().collect::<std::collections::BTreeMap<_, _>>(),
     })
 }

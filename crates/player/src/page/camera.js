@@ -1,6 +1,6 @@
 // From where the plant is looked at. Matrices are column by column.
 
-// Half of the field of view in perspective is 15 degrees.
+// Half of the field of view in perspective is 15 degrees, unless a model declares another.
 const SLOPE = Math.tan(Math.PI / 12);
 
 function dot(a, b) {
@@ -20,11 +20,23 @@ class Camera {
     this.look(0, 0);
   }
 
+  // As a declared camera, whatever the plant does: `eye` and `aim` are points, `angle` is that of view across the smaller side (degrees).
+  stand({ eye, aim, angle }) {
+    const away = eye.map((x, i) => x - aim[i]);
+    const distance = Math.hypot(...away);
+    this.azimuth = (Math.atan2(away[0], away[2]) * 180) / Math.PI;
+    this.elevation = (Math.atan2(away[1], Math.hypot(away[0], away[2])) * 180) / Math.PI;
+    this.zoom = 1;
+    this.target = aim;
+    this.lens = { distance, slope: Math.tan((angle * Math.PI) / 360) };
+  }
+
   // From a side, such that everything is seen; degrees.
   look(azimuth, elevation) {
     this.azimuth = azimuth;
     this.elevation = elevation;
     this.zoom = 1;
+    this.lens = null;
     // Kept while the plant is turned, so that it does not change its size then.
     const [right, up, towards] = this.axes();
     // The middle of what is seen.
@@ -54,8 +66,14 @@ class Camera {
     return [right, up, towards];
   }
 
+  // Half of the height that is seen at the distance 1.
+  slope(aspect) {
+    return this.lens ? this.lens.slope / Math.min(1, aspect) : SLOPE;
+  }
+
   // Half of the height of the plane through the target that is seen, in scene units.
   reach(aspect) {
+    if (this.lens) return (this.lens.distance * this.slope(aspect)) / this.zoom;
     // What is nearer than the target is seen larger.
     const slope = this.perspective ? SLOPE : 0;
     const needed = this.fit.reduce((most, [right, up, near]) => Math.max(most, Math.max(up, right / aspect) + near * slope), this.radius / 50);
@@ -80,7 +98,7 @@ class Camera {
   matrices(aspect) {
     const [right, up, towards] = this.axes();
     const reach = this.reach(aspect);
-    const distance = reach / SLOPE;
+    const distance = reach / this.slope(aspect);
     const eye = (axis) => -axis.reduce((sum, x, i) => sum + x * this.target[i], 0);
     // Depth is counted from the target in the direction of the viewer, as in pictures.
     const view = [0, 1, 2].flatMap((i) => [right[i], up[i], towards[i], 0]);

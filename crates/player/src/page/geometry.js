@@ -47,6 +47,8 @@ class Geometry {
       if (track.last < now) continue;
       const look = lookAt(track, now);
       const color = look.material < 0 ? 0 : this.palette[look.material];
+      // The fourth byte says whether light comes through: not through stems and ground.
+      this.mask = track.kind === 0 || isGround(track) ? 0xffffff : -1;
       if (this.net.length < track.width) this.net = new Float32Array(2 * track.width);
       placeAt(track, frame, this.net, 0);
       if (track.kind === 0) this.addStem(this.outlines[track.detail], look.variant, color);
@@ -96,7 +98,7 @@ class Geometry {
     corners[at + 3] = nx;
     corners[at + 4] = ny;
     corners[at + 5] = nz;
-    this.colors[at + 6] = color;
+    this.colors[at + 6] = color & this.mask;
   }
 
   // A length of a stem between two cross-sections: centre, u, v; see export/lengths.rs.

@@ -13,32 +13,46 @@ function drawsInSoftware() {
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
+// Corners, normals and colours have the same places in all programs, so that one array of them serves all.
+const ATTRIBUTES = ["corner", "normal", "color", "pin"];
+
 class Painter {
-  constructor(canvas, recording) {
+  // `points`: those of the plant that are outermost in some direction; `beyond`: how far from the origin ground of soil may be.
+  constructor(canvas, recording, points, beyond) {
     // Smooth edges take a program as long as all the rest; then what stands still is drawn larger instead.
     this.software = drawsInSoftware();
     const options = { antialias: !this.software, alpha: false, preserveDrawingBuffer: true };
     const gl = (this.gl = canvas.getContext("webgl2", options));
     this.recording = recording;
     this.geometry = new Geometry(recording);
-    const { surface, light } = recording.shaders;
+    const { shade, open, sun, surface, light } = recording.shaders;
     const { hasPictures } = this.geometry;
+    // Drawings without depth are diagrams: their colours mean something, and nothing casts a shadow.
+    this.relief = Math.min(1, Math.min(...recording.size) / 0.02);
+    const hasFloor = recording.floor !== null && this.relief > 0;
+    const casts = (recording.light || hasFloor) && this.relief > 0 && points.length > 0;
     const option = hasPictures ? "#define PICTURES\nprecision highp sampler2DArray;\n" : "";
-    const program = (this.program = this.compiled(option + surface, option + light));
+    const receiving = casts ? `#define RECEIVES\n#define PLACES ${PLACES}\n` : "";
+    const before = option + receiving + shade;
+    const program = (this.program = this.compiled(before + open + surface, before + sun + light));
     const uniforms = ["view", "projection", "relief", "falloff", "near", "sun", "zenith", "tint"];
     this.places = Object.fromEntries(uniforms.map((name) => [name, gl.getUniformLocation(program, name)]));
+    const compiled = (vertex, fragment) => this.compiled(vertex, fragment);
+    this.shadows = casts ? new Shadows(gl, recording, points, beyond, compiled, option, this.software) : null;
+    this.shadows?.bind(program);
+    this.floor = hasFloor ? new Floor(gl, recording, this.shadows, compiled, receiving) : null;
     gl.useProgram(program);
     this.corners = gl.createBuffer();
     gl.bindBuffer(gl.ARRAY_BUFFER, this.corners);
     for (const [name, count, type, offset] of [["corner", 3, gl.FLOAT, 0], ["normal", 3, gl.FLOAT, 12], ["color", 4, gl.UNSIGNED_BYTE, 24]]) {
-      const place = gl.getAttribLocation(program, name);
+      const place = ATTRIBUTES.indexOf(name);
       gl.enableVertexAttribArray(place);
       gl.vertexAttribPointer(place, count, type, type !== gl.FLOAT, 4 * CORNER, offset);
     }
     if (hasPictures) {
       this.pins = gl.createBuffer();
       gl.bindBuffer(gl.ARRAY_BUFFER, this.pins);
-      const place = gl.getAttribLocation(program, "pin");
+      const place = ATTRIBUTES.indexOf("pin");
       gl.enableVertexAttribArray(place);
       gl.vertexAttribPointer(place, PIN, gl.FLOAT, false, 4 * PIN, 0);
       // What is cut out has edges as smooth as those of triangles.
@@ -47,7 +61,6 @@ class Painter {
     }
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.enable(gl.DEPTH_TEST);
-    const compiled = (vertex, fragment) => this.compiled(vertex, fragment);
     this.veil = recording.clouds ? new Veil(gl, recording, compiled) : null;
     this.sky = recording.light?.sky ? new Sky(gl, recording, compiled) : null;
     gl.clearColor(...BACKGROUND, 1);
@@ -63,6 +76,7 @@ class Painter {
       if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
       gl.attachShader(program, shader);
     }
+    ATTRIBUTES.forEach((name, place) => gl.bindAttribLocation(program, place, name));
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
     return program;
@@ -111,41 +125,49 @@ class Painter {
     }
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, geometry.triangles.subarray(0, geometry.used), gl.STREAM_DRAW);
     this.triangles = geometry.used / 3;
+    this.shadows?.change();
     this.veil?.stage(frame);
   }
 
-  // The declared light, in the directions of the view; its shadows are in pictures only.
+  // The declared light, in the directions of the view.
   light(view) {
     const { gl, places } = this;
     const { light } = this.recording;
-    if (!light) return gl.uniform3f(places.tint, -1, 0, 0);
+    gl.uniform3fv(places.tint, tintOf(light));
+    if (!light) return;
     const seen = ([x, y, z]) => [0, 1, 2].map((i) => view[i] * x + view[4 + i] * y + view[8 + i] * z);
-    const [zenith, horizon] = (light.sky || ["#b4cdf0", "#f2efe8"]).map(channelsOf);
-    const mean = zenith.map((c, i) => 0.6 * c + 0.4 * horizon[i]);
     gl.uniform3fv(places.sun, light.sun ? seen(light.sun) : [0, 0, 0]);
     gl.uniform3fv(places.zenith, seen([0, 1, 0]));
-    gl.uniform3fv(places.tint, mean.map((c) => c / Math.max(1e-3, ...mean)));
   }
 
-  // Draws what was taken in last, once pictures are unpacked.
-  paint(camera, width, height) {
+  // Draws what was taken in last, once pictures are unpacked. `sharp`: as well as can be, for what stands still.
+  paint(camera, width, height, sharp) {
     if (!this.isReady) return;
-    const { gl, places } = this;
+    const { gl, places, relief } = this;
+    const draw = () => gl.drawElements(gl.TRIANGLES, 3 * this.triangles, gl.UNSIGNED_INT, 0);
+    this.shadows?.make(sharp, draw);
     const { view, projection, near } = camera.matrices(width / height);
     const { extent, size } = this.recording;
-    const depth = Math.min(...size);
     gl.viewport(0, 0, width, height);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    this.sky?.paint(view, camera.perspective);
+    this.sky?.paint(view, camera.perspective ? camera.slope(width / height) : 0);
     gl.useProgram(this.program);
     gl.uniformMatrix4fv(places.view, false, view);
     gl.uniformMatrix4fv(places.projection, false, projection);
-    // Drawings without depth are diagrams: their colours mean something.
-    gl.uniform1f(places.relief, Math.min(1, depth / 0.02));
-    gl.uniform1f(places.falloff, (0.16 * Math.min(1, depth / 0.2)) / extent);
+    gl.uniform1f(places.relief, relief);
+    gl.uniform1f(places.falloff, (0.16 * Math.min(1, Math.min(...size) / 0.2)) / extent);
     gl.uniform1f(places.near, near);
     this.light(view);
-    gl.drawElements(gl.TRIANGLES, 3 * this.triangles, gl.UNSIGNED_INT, 0);
+    draw();
+    this.floor?.paint(view, projection, relief);
     this.veil?.paint(view, projection);
   }
+}
+
+// The tint of what only a declared sky lights, or of the sky that is there beside a declared sun; the first number is negative without either.
+function tintOf(light) {
+  if (!light) return [-1, 0, 0];
+  const [zenith, horizon] = (light.sky || ["#b4cdf0", "#f2efe8"]).map(channelsOf);
+  const mean = zenith.map((c, i) => 0.6 * c + 0.4 * horizon[i]);
+  return mean.map((c) => c / Math.max(1e-3, ...mean));
 }

@@ -26,13 +26,14 @@ class Player {
     this.speed = 1;
     this.elements = Object.fromEntries([...document.querySelectorAll("[id]")].map((element) => [element.id, element]));
     const { extent, size } = recording;
+    const ground = reachOfGround(recording);
     this.camera = new Camera(
       size.map((side) => side * extent),
       outermost(recording),
-      reachOfGround(recording),
+      recording.floor === null ? ground : Math.max(ground, 1.5 * FAR_AWAY * extent),
     );
-    if (recording.camera) this.camera.look(...recording.camera);
-    this.painter = new Painter(this.elements.plant, recording);
+    if (recording.camera) this.camera.stand(recording.camera);
+    this.painter = new Painter(this.elements.plant, recording, this.camera.points, ground);
     this.moments = [...new Set(recording.events.map(([time]) => time))];
     this.describe();
     this.listen();
@@ -173,6 +174,12 @@ class Player {
     this.stale = true;
   }
 
+  // Looks through the declared camera, if there is one.
+  stand() {
+    if (this.recording.camera) this.camera.stand(this.recording.camera);
+    this.stale = true;
+  }
+
   // Once for every picture of the screen.
   step(now) {
     requestAnimationFrame(this.step);
@@ -237,7 +244,7 @@ class Player {
       this.painter.stage(frame, detail);
       [this.staged, this.detail] = [frame, detail];
     }
-    this.painter.paint(this.camera, width, height);
+    this.painter.paint(this.camera, width, height, this.sharp);
     elements.time.value = time;
     elements.clock.textContent = `t = ${shown(time)}`;
     const count = recording.modules[Math.floor(frame)];
@@ -381,6 +388,7 @@ class Player {
       2: () => this.look(90, 0),
       3: () => this.look(0, 90),
       0: () => this.look(this.camera.azimuth, this.camera.elevation),
+      c: () => this.stand(),
     };
     const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     // A list of choices has its own keys, and so has a button that was reached by the keyboard.

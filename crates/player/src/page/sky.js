@@ -10,11 +10,12 @@ class Sky {
     ["high", "low"].forEach((name, i) => gl.uniform3fv(gl.getUniformLocation(program, name), channelsOf(light.sky[i])));
   }
 
-  paint(view, perspective) {
+  // `slope`: half of the height that is seen at the distance 1; 0 without perspective.
+  paint(view, slope) {
     const { gl, places } = this;
     gl.useProgram(this.program);
     gl.uniform3f(places.zenith, view[4], view[5], view[6]);
-    gl.uniform1f(places.slope, perspective ? SLOPE : 0);
+    gl.uniform1f(places.slope, slope);
     gl.bindVertexArray(this.array);
     gl.depthMask(false);
     gl.disable(gl.DEPTH_TEST);

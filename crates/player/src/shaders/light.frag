@@ -1,10 +1,13 @@
 // The light of pictures (crates/render/src/light.rs): one lamp, fixed to the viewer; light from all directions, more of it from above; light
-// that comes through leaves; a gloss; things get darker with their distance. Or a declared sun and sky, without shadows.
+// that comes through leaves; a gloss; things get darker with their distance. Or a declared sun and sky, with shadows.
+// Host: version, precision, shade.glsl and sun.glsl stand before this.
 
 in vec3 seen;
 in vec3 facing;
-in vec3 shade;
+in vec4 shade;
+in vec2 open;
 
+uniform mat4 view;
 // How much relief is drawn, from 0 (a flat drawing) to 1.
 uniform float relief;
 // Light that is lost for a unit of depth, and the depth from which.
@@ -40,7 +43,8 @@ void main() {
     vec3 normal = normalize(facing);
     // Of what is seen from behind, the back is lit.
     if (!gl_FrontFacing) normal = -normal;
-    vec3 color = shade;
+    vec3 color = shade.rgb;
+    float through = TRANSMITTED * shade.a;
     float opacity = 1.0;
 #ifdef PICTURES
     // Derivatives are those of all pixels, before any of them goes another way.
@@ -63,26 +67,26 @@ void main() {
         vec3 half_way = normalize(LAMP + vec3(0.0, 0.0, 1.0));
         float gloss = pow(max(dot(normal, half_way), 0.0), SHARPNESS) - pow(half_way.z, SHARPNESS);
         float cosine = dot(normal, LAMP);
-        // What is closed shows no side that light comes through.
-        float diffuse = (max(cosine + WRAP, 0.0) - (LAMP.z + WRAP)) / (1.0 + WRAP) + TRANSMITTED * max(-cosine, 0.0);
+        float diffuse = (max(cosine + WRAP, 0.0) - (LAMP.z + WRAP)) / (1.0 + WRAP) + through * max(-cosine, 0.0);
         // Ground goes on behind the plant.
         strength = 1.0 - min(falloff * max(near - seen.z, 0.0), 0.25) + relief * (DIFFUSE * diffuse + ABOVE * normal.y + GLOSS * gloss);
     } else {
         bool has_sun = dot(sun, sun) > 0.0;
-        float up = dot(normal, zenith);
-        float lit = (has_sun ? 0.56 : 1.25) * (0.5 + 0.5 * up) + 0.26 * (0.5 - 0.5 * up) + 0.04;
-        if (has_sun) {
-            float cosine = dot(normal, sun);
+        vec2 sky = gl_FrontFacing ? open : open.yx;
+        float from_sky = sky.x + through * max(sky.y - sky.x, 0.0);
+        float strong = (has_sun ? SKY : SKY_ALONE) * from_sky + GROUND * (0.5 - 0.5 * dot(normal, zenith)) + LEAST;
+        float cosine = dot(normal, sun);
+        if (has_sun && (cosine > 0.0 || through > 0.0)) {
             vec3 half_way = normalize(sun + vec3(0.0, 0.0, 1.0));
             float gloss = cosine > 0.0 ? GLOSS * pow(max(dot(normal, half_way), 0.0), SHARPNESS) : 0.0;
-            lit += 0.66 * (cosine > 0.0 ? cosine : -TRANSMITTED * cosine) + gloss;
+            float past = 1.0;
+#ifdef RECEIVES
+            vec3 lit_side = cosine < 0.0 ? -normal : normal;
+            past = sunlit((seen - view[3].xyz) * mat3(view), lit_side * mat3(view));
+#endif
+            strong += past * (SUN * (cosine > 0.0 ? cosine : -through * cosine) + gloss);
         }
-        strength = 1.0 + relief * (lit - 1.0);
-        color *= mix(tint, vec3(1.0), clamp((strength - 0.35) / 0.5, 0.0, 1.0));
+        strength = 1.0 + relief * (strong - 1.0);
     }
-    vec3 shadow = vec3(0.0, 0.05, 0.15);
-    vec3 lit = strength <= 1.0
-        ? color * (shadow + (1.0 - shadow) * strength)
-        : color + (1.0 - color) * (strength - 1.0);
-    painted = vec4(clamp(lit, 0.0, 1.0), opacity);
+    painted = vec4(lit(color, strength, tint), opacity);
 }
