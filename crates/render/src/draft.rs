@@ -114,6 +114,18 @@ impl<'s> Draft<'s> {
         Draft { scene, default_width, mesh, thin, next }
     }
 
+    /// Presses the stems of a drawing in a plane into that plane, which has this unit normal: in perspective, ends of tubes would be ellipses, and
+    /// a diagram has straight ones. What hides what stays as it was.
+    pub(super) fn flatten(&mut self, normal: Vector) {
+        /// The part of the depth that is left.
+        const LEFT: f64 = 1e-3;
+        let Some(first) = self.scene.segments.first() else { return };
+        let depth = normal.dot(&first.start.coords);
+        for vertex in &mut self.mesh.vertices {
+            *vertex -= normal * ((normal.dot(&vertex.coords) - depth) * (1.0 - LEFT));
+        }
+    }
+
     /// Of a triangle of which parts are cut out: where its corners lie in the picture, and that.
     pub(super) fn cut_out(&self, face: &Triangle) -> Option<([[f64; 2]; 3], &'s Texture)> {
         if self.mesh.places.is_empty() {

@@ -117,7 +117,10 @@ impl<'s> Stage<'s> {
             floor: scene.surroundings.floor,
         };
         let shared = plan.wanted.iter().map(|_| OnceLock::new()).collect();
-        let scene = Draft::new(scene, fit.default_width, &detail);
+        let mut scene = Draft::new(scene, fit.default_width, &detail);
+        if detail.is_flat && fit.camera.eye().is_some() {
+            scene.flatten(fit.camera.view().towards());
+        }
         Stage {
             scene,
             wanted: plan.wanted,
