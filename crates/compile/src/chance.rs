@@ -166,7 +166,7 @@ impl Drawn {
 /// The draws that some expressions read whatever the values of their conditions.
 fn unconditional(graph: &Graph, draws: &[DraftDraw], roots: &[NodeId]) -> Vec<u32> {
     let mut sure = Vec::new();
-    let mut seen: std::collections::HashSet<NodeId> = roots.iter().copied().collect();
+    let mut seen: dlsys_expr::NodeSet = roots.iter().copied().collect();
     let mut stack: Vec<NodeId> = roots.to_vec();
     while let Some(id) = stack.pop() {
         let next: Vec<NodeId> = match graph.node(id) {

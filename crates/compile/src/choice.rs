@@ -1,11 +1,10 @@
 //! `match`: one of several values, by a number.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::scope::{Lowered, Scope};
 use dlsys_diagnostic::Diagnostic;
-use dlsys_expr::NodeId;
+use dlsys_expr::{NodeId, NodeMap};
 use dlsys_model::Comparison;
 use dlsys_syntax::ast::{ExprId, Expressions};
 use dlsys_syntax::print;
@@ -20,7 +19,7 @@ impl Scope {
     ) -> Option<NodeId> {
         let node = self.expect_number(all, subject, done(subject)?);
         let mut whole = self.expect_number(all, otherwise, done(otherwise)?);
-        let mut seen: HashMap<NodeId, ExprId> = HashMap::new();
+        let mut seen: NodeMap<ExprId> = NodeMap::default();
         let mut links = Vec::new();
         for &(value, then) in cases {
             let case = self.expect_number(all, value, done(value)?)?;

@@ -11,7 +11,7 @@ use crate::chance::Draws;
 use crate::inputs;
 use crate::land::{self, Land};
 use dlsys_diagnostic::{Diagnostic, Span};
-use dlsys_expr::{Binary, Graph, Integral, Lookup, NodeId, Unary};
+use dlsys_expr::{Binary, Graph, Integral, Lookup, NodeId, NodeMap, Unary};
 use dlsys_model::{Comparison, Fold, Quantity};
 use dlsys_syntax::ast::{Aggregate, Expr, ExprId, Expression, Expressions, HeadModule, Name, Operator};
 use dlsys_syntax::print;
@@ -82,11 +82,11 @@ pub struct Scope {
     pub(super) unknown: HashSet<Arc<str>>,
     /// Place and text of the comparisons of the current rule, by node. Rules number their variables alike, so that the nodes
     /// of one rule are not valid in another.
-    pub comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
+    pub comparisons: NodeMap<(Span, Arc<[String; 2]>)>,
     /// The aggregates of the current rule, in the order of their variables.
     pub gathered: Vec<Gathered>,
     /// Place and text of the comparisons in the bodies of functions, by node.
-    pub(super) function_comparisons: HashMap<NodeId, (Span, Arc<[String; 2]>)>,
+    pub(super) function_comparisons: NodeMap<(Span, Arc<[String; 2]>)>,
     pub diagnostics: Vec<Diagnostic>,
     /// Names that only comments define, with their values.
     pub(super) commented: HashMap<Arc<str>, String>,

@@ -3,14 +3,13 @@
 //! An equation is smooth between the instants at which its conditions change, so that an integrator keeps its order there.
 //! Each condition becomes a variable, and its change an event (see [`Switch`]).
 
-use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use crate::analysis::{driven_form, outside_of_drivers};
 use crate::conditions::Atoms;
 use crate::rules::RuleBuilder;
 use dlsys_diagnostic::Span;
-use dlsys_expr::{Binary, Graph, Node, NodeId, Part, Unary};
+use dlsys_expr::{Binary, Graph, Node, NodeId, NodeMap, NodeSet, Part, Unary};
 use dlsys_model::Switch;
 
 impl RuleBuilder<'_> {
@@ -103,7 +102,7 @@ fn where_defined(graph: &mut Graph, smooth: NodeId, written: NodeId, first_flag:
 
 /// True for a piecewise constant expression such as `floor(t)/2`.
 fn is_step(graph: &Graph, root: NodeId, still: &dyn Fn(u32) -> bool) -> bool {
-    let mut steps: HashSet<NodeId> = HashSet::new();
+    let mut steps: NodeSet = NodeSet::default();
     for id in graph.reachable(&[root]) {
         let is = match graph.node(id) {
             Node::Const(_) | Node::Element(..) => true,
@@ -142,8 +141,8 @@ impl Frozen {
         graph: &mut Graph,
         root: NodeId,
         still: &dyn Fn(u32) -> bool,
-        outside: Option<&HashSet<NodeId>>,
-        comparisons: &mut HashMap<NodeId, (Span, Arc<[String; 2]>)>,
+        outside: Option<&NodeSet>,
+        comparisons: &mut NodeMap<(Span, Arc<[String; 2]>)>,
         span: Span,
     ) -> NodeId {
         graph.rewrite(&[root], |graph, id, rebuilt| {
@@ -169,7 +168,7 @@ impl Frozen {
         id: NodeId,
         rebuilt: Node,
         still: &dyn Fn(u32) -> bool,
-        comparisons: &mut HashMap<NodeId, (Span, Arc<[String; 2]>)>,
+        comparisons: &mut NodeMap<(Span, Arc<[String; 2]>)>,
         span: Span,
     ) -> Option<NodeId> {
         let zero = graph.constant(0.0);

@@ -1,17 +1,15 @@
 //! Symbolic derivatives, for Jacobians.
 
-use std::collections::HashMap;
-
-use super::{Binary, Graph, Node, NodeId, Part, Unary};
+use super::{Binary, Graph, Node, NodeId, NodeMap, Part, Unary};
 
 impl Graph {
     /// The partial derivative of an expression by a variable. Functions that jump (`floor`, `sign`, comparisons)
     /// have the derivative 0, which is what holds between the jumps; so have derivatives of fields, of which no second ones are known.
     pub fn derivative(&mut self, root: NodeId, variable: u32) -> NodeId {
         let zero = self.constant(0.0);
-        let mut known: HashMap<NodeId, NodeId> = HashMap::new();
+        let mut known: NodeMap<NodeId> = NodeMap::default();
         for id in self.reachable(&[root]) {
-            let of = |known: &HashMap<NodeId, NodeId>, id: NodeId| known[&id];
+            let of = |known: &NodeMap<NodeId>, id: NodeId| known[&id];
             let rate = match self.node(id) {
                 Node::Const(_) => zero,
                 Node::Var(v) => self.constant(if v == variable { 1.0 } else { 0.0 }),

@@ -1,7 +1,9 @@
 //! Hash-consed expression graphs: construction with folding of constants, rebuilding, and reachability.
 
-use std::collections::HashMap;
+use std::collections::BinaryHeap;
 use std::sync::Arc;
+
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::{Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Part, Unary, Value};
 
@@ -15,6 +17,11 @@ impl NodeId {
         self.0 as usize
     }
 }
+
+/// Something of each of some expressions.
+pub type NodeMap<T> = FxHashMap<NodeId, T>;
+/// Some expressions.
+pub type NodeSet = FxHashSet<NodeId>;
 
 /// One operation; operands always have smaller ids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -47,12 +54,12 @@ pub struct Lookup(u32);
 #[derive(Clone, Debug, Default)]
 pub struct Graph {
     nodes: Vec<Node>,
-    ids: HashMap<Node, NodeId>,
+    ids: FxHashMap<Node, NodeId>,
     curves: Vec<Arc<Curve>>,
     arrays: Vec<Arc<Array>>,
     fields: Vec<FieldSlot>,
     /// Expressions whose antiderivative by another one is known.
-    integrals: HashMap<NodeId, Integral>,
+    integrals: NodeMap<Integral>,
 }
 
 /// An antiderivative of an expression: the expression is the derivative of `whole` by `argument`.
@@ -256,7 +263,7 @@ impl Graph {
         roots: &[NodeId],
         mut replace: impl FnMut(&mut Graph, NodeId, Node) -> Option<NodeId>,
     ) -> Vec<NodeId> {
-        let mut new: HashMap<NodeId, NodeId> = HashMap::new();
+        let mut new: NodeMap<NodeId> = NodeMap::default();
         for id in self.reachable(roots) {
             let rebuilt = match self.node(id) {
                 leaf @ (Node::Const(_) | Node::Var(_)) => leaf,
@@ -288,31 +295,31 @@ impl Graph {
 
     /// All expressions that `roots` are built from, operands first.
     pub fn reachable(&self, roots: &[NodeId]) -> Vec<NodeId> {
-        let mut stack: Vec<NodeId> = roots.to_vec();
-        let mut seen: std::collections::HashSet<NodeId> = roots.iter().copied().collect();
-        while let Some(id) = stack.pop() {
-            for operand in self.node(id).operands().into_iter().flatten() {
-                if seen.insert(operand) {
-                    stack.push(operand);
-                }
-            }
-        }
-        let mut all: Vec<NodeId> = seen.into_iter().collect();
-        // Operands have smaller ids, so this is an order of evaluation, and not one of hashing.
-        all.sort_unstable();
+        let mut all: Vec<NodeId> = self.descending(roots).collect();
+        all.reverse();
         all
+    }
+
+    /// The same, operands last: operands have smaller ids, so the largest that is left has no users left.
+    fn descending(&self, roots: &[NodeId]) -> impl Iterator<Item = NodeId> {
+        let mut left: BinaryHeap<NodeId> = roots.iter().copied().collect();
+        std::iter::from_fn(move || {
+            let id = left.pop()?;
+            while left.peek() == Some(&id) {
+                left.pop();
+            }
+            left.extend(self.node(id).operands().into_iter().flatten());
+            Some(id)
+        })
     }
 
     /// The variables that `roots` read, ascending.
     pub fn variables(&self, roots: &[NodeId]) -> Vec<u32> {
-        let mut all: Vec<u32> = self
-            .reachable(roots)
-            .into_iter()
-            .filter_map(|id| match self.node(id) {
-                Node::Var(v) => Some(v),
-                _ => None,
-            })
-            .collect();
+        let variable = |id| match self.node(id) {
+            Node::Var(v) => Some(v),
+            _ => None,
+        };
+        let mut all: Vec<u32> = self.descending(roots).filter_map(variable).collect();
         all.sort_unstable();
         all
     }

@@ -49,7 +49,7 @@ pub use elimination::eliminate;
 pub use error::Error;
 pub use field::{FIELD_ARGUMENTS, Field, FieldPart, FieldSlot};
 pub use fold::Fold;
-pub use graph::{Graph, Integral, Lookup, Node, NodeId};
+pub use graph::{Graph, Integral, Lookup, Node, NodeId, NodeMap, NodeSet};
 pub use held::Held;
 pub use interval::Interval;
 pub use ops::{Binary, Unary, Value};

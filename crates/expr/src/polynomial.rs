@@ -3,10 +3,10 @@
 //! The analysis of a model recognises mathematics, not spellings: `r*(1 - x/m)*x` and `r*x - r*x^2/m` have the
 //! same coefficients in x.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use super::{Binary, Graph, Node, NodeId, Unary};
+use super::{Binary, Graph, Node, NodeId, NodeMap, Unary};
 
 /// Powers of the variables, ascending by variable, none of them zero.
 pub type Monomial = Vec<(u32, u32)>;
@@ -44,7 +44,7 @@ impl Graph {
     /// be seen to be one, or too long a one.
     pub fn polynomial(&mut self, root: NodeId, is_variable: impl Fn(u32) -> bool) -> Option<Polynomial> {
         // None: free of the variables.
-        let mut known: HashMap<NodeId, Option<Rc<Polynomial>>> = HashMap::new();
+        let mut known: NodeMap<Option<Rc<Polynomial>>> = NodeMap::default();
         for id in self.reachable(&[root]) {
             let node = self.node(id);
             let free = node.operands().into_iter().flatten().all(|o| known[&o].is_none());
@@ -141,7 +141,7 @@ impl Graph {
 }
 
 /// An operand as a polynomial; one without variables is its own constant term.
-fn part(known: &HashMap<NodeId, Option<Rc<Polynomial>>>, id: NodeId) -> Rc<Polynomial> {
+fn part(known: &NodeMap<Option<Rc<Polynomial>>>, id: NodeId) -> Rc<Polynomial> {
     known[&id].clone().unwrap_or_else(|| Rc::new(Polynomial::constant(id)))
 }
 

@@ -4,8 +4,8 @@ use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use super::{
-    Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Graph, Lookup, Node, NodeId, Part, Unary,
-    Value,
+    Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Graph, Lookup, Node, NodeId, NodeMap, Part,
+    Unary, Value,
 };
 
 /// A register: variables come first, then temporaries.
@@ -145,8 +145,8 @@ fn in_registers(graph: &Graph, id: NodeId) -> [Option<NodeId>; 4] {
 
 /// How often each expression is an operand in a register. An output has one use that never ends, so that its register is not given
 /// away.
-fn uses(graph: &Graph, order: &[NodeId], roots: &[NodeId]) -> HashMap<NodeId, usize> {
-    let mut uses: HashMap<NodeId, usize> = HashMap::new();
+fn uses(graph: &Graph, order: &[NodeId], roots: &[NodeId]) -> NodeMap<usize> {
+    let mut uses: NodeMap<usize> = NodeMap::default();
     for &id in order {
         for operand in in_registers(graph, id).into_iter().flatten() {
             *uses.entry(operand).or_default() += 1;
@@ -162,9 +162,9 @@ fn uses(graph: &Graph, order: &[NodeId], roots: &[NodeId]) -> HashMap<NodeId, us
 struct Compiler<'g> {
     graph: &'g Graph,
     /// Uses of each expression that are still to come.
-    uses: HashMap<NodeId, usize>,
+    uses: NodeMap<usize>,
     /// Where values are.
-    place: HashMap<NodeId, Register>,
+    place: NodeMap<Register>,
     /// Registers whose values are no longer used.
     free: Vec<Register>,
     /// Number of registers so far.
@@ -232,7 +232,7 @@ impl Program {
         let mut compiler = Compiler {
             graph,
             uses: uses(graph, &order, roots),
-            place: HashMap::new(),
+            place: NodeMap::default(),
             free: Vec::new(),
             registers: variables as Register,
             curves: Table::default(),

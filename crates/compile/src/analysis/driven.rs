@@ -8,7 +8,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::invariance::Random;
-use dlsys_expr::{Binary, Curve, Graph, Integral, Monomial, Node, NodeId, Part, Polynomial, Program, Unary};
+use dlsys_expr::{
+    Binary, Curve, Graph, Integral, Monomial, Node, NodeId, NodeMap, Part, Polynomial, Program, Unary,
+};
 use dlsys_model::{DrivenGrowth, GrowthLaw};
 
 /// Variables from this number on stand for parts of a rate; those of functions have higher numbers.
@@ -58,7 +60,7 @@ struct Driver {
 #[derive(Default)]
 struct Parts {
     drivers: Vec<Driver>,
-    images: HashMap<NodeId, NodeId>,
+    images: NodeMap<NodeId>,
     power: Option<NodeId>,
 }
 

@@ -10,7 +10,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use dlsys_expr::{Binary, Curve, Graph, Node, NodeId, Unary, Value};
+use dlsys_expr::{Binary, Curve, Graph, Node, NodeId, NodeMap, Unary, Value};
 
 /// Relative rounding error of one operation.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
@@ -201,7 +201,7 @@ pub fn forms(
     variables: &dyn Fn(u32) -> Option<Form>,
     all: &mut Indeterminates,
 ) -> Option<Vec<Form>> {
-    let mut known: HashMap<NodeId, Form> = HashMap::new();
+    let mut known: NodeMap<Form> = NodeMap::default();
     for id in graph.reachable(roots) {
         let form = match graph.node(id) {
             Node::Const(bits) => Form::number(Bounded::written(f64::from_bits(bits))),
