@@ -52,7 +52,8 @@ impl Order<'_> {
             )));
         }
         let mark = self.format.mark();
-        spare(&self.out, self.force, self.format.extension(), |start| start.starts_with(mark))
+        let kind = format!("a {}", self.format.extension().to_uppercase());
+        spare(&self.out, self.force, &kind, |start| start.starts_with(mark))
     }
 }
 

@@ -27,13 +27,8 @@ pub fn file_of(out: &Path, model: &Path, wanted: &str) -> Result<PathBuf, Failur
     }
 }
 
-/// Refuses to write over a file of another kind; `is_ours` tells by its first bytes whether it is of this one.
-pub fn spare(
-    out: &Path,
-    force: bool,
-    extension: &str,
-    is_ours: impl Fn(&[u8]) -> bool,
-) -> Result<(), Failure> {
+/// Refuses to write over a file of another kind (`kind`: what it is not, with its article); `is_ours` tells by its first bytes whether it is of this one.
+pub fn spare(out: &Path, force: bool, kind: &str, is_ours: impl Fn(&[u8]) -> bool) -> Result<(), Failure> {
     if out.is_dir() {
         return Err(usage(format!("{} is a directory: name another file", out.display())));
     }
@@ -49,9 +44,8 @@ pub fn spare(
         return Ok(());
     }
     Err(usage(format!(
-        "{} is there and is not a {} file: choose another name, or add --force",
-        out.display(),
-        extension.to_uppercase()
+        "{} is there and is not {kind} file: choose another name, or add --force",
+        out.display()
     )))
 }
 

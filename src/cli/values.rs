@@ -25,7 +25,12 @@ pub enum RenderFormat {
     Growth(interchange::Format),
     /// One file of pictures.
     Film(film::Format),
+    /// One SVG document that plays by itself.
+    Moving,
 }
+
+/// The name of the format of one SVG document that plays by itself.
+pub const ANIMATED_SVG: &str = "asvg";
 
 /// A format for frames or for a whole animation.
 pub(super) fn render_format() -> impl TypedValueParser<Value = RenderFormat> {
@@ -34,13 +39,18 @@ pub(super) fn render_format() -> impl TypedValueParser<Value = RenderFormat> {
     let usda =
         PossibleValue::new("usda").help("One animated file, USD in text: see --format usda of `dlsys run`");
     let films = film::Format::ALL.map(|film| PossibleValue::new(film.extension()).help(film.about()));
-    PossibleValuesParser::new(frames.chain([glb, usda]).chain(films)).try_map(|name| match &*name {
-        "glb" => Ok(RenderFormat::Growth(interchange::Format::Glb)),
-        "usda" => Ok(RenderFormat::Growth(interchange::Format::Usda)),
-        name => match film::Format::ALL.into_iter().find(|film| film.extension() == name) {
-            Some(film) => Ok(RenderFormat::Film(film)),
-            None => name.parse::<Format>().map(RenderFormat::Frames),
-        },
+    let moving = PossibleValue::new(ANIMATED_SVG)
+        .help("A film in one file: animated SVG, sharp at any size; browsers play it in <img>");
+    PossibleValuesParser::new(frames.chain([glb, usda]).chain(films).chain([moving])).try_map(|name| {
+        match &*name {
+            ANIMATED_SVG => Ok(RenderFormat::Moving),
+            "glb" => Ok(RenderFormat::Growth(interchange::Format::Glb)),
+            "usda" => Ok(RenderFormat::Growth(interchange::Format::Usda)),
+            name => match film::Format::ALL.into_iter().find(|film| film.extension() == name) {
+                Some(film) => Ok(RenderFormat::Film(film)),
+                None => name.parse::<Format>().map(RenderFormat::Frames),
+            },
+        }
     })
 }
 

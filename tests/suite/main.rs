@@ -36,6 +36,7 @@ mod limits;
 mod linear;
 mod listings;
 mod meadow;
+mod moving;
 mod organs;
 mod pages;
 mod particles;

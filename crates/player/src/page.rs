@@ -3,7 +3,7 @@
 //! The file has three parts that matter: the player and its shaders (`page/`, `shaders/`), a description of the recording as
 //! JSON, and its tracks (see `encode.rs`) in base64.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 use serde_json::{Value, json};
 
@@ -19,33 +19,38 @@ use dlsys_render::{GENERATOR, Spoke};
 const PAGE: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/style.css");
 /// The scripts, each after those that it needs.
-const SCRIPTS: [&str; 9] = [
+const SCRIPTS: [&str; 7] = [
     include_str!("page/recording.js"),
     include_str!("page/camera.js"),
     include_str!("page/geometry.js"),
     include_str!("page/clouds.js"),
     include_str!("page/sky.js"),
-    include_str!("page/shadows.js"),
-    include_str!("page/floor.js"),
     include_str!("page/painter.js"),
     include_str!("page/player.js"),
 ];
 
+/// Those that only scenes with declared light or a floor need, before the others.
+const SCENE_SCRIPTS: [&str; 2] = [include_str!("page/shadows.js"), include_str!("page/floor.js")];
+
 /// The shaders, by name; without a version, which depends on where they run.
-pub const SHADERS: [(&str, &str); 13] = [
+pub const SHADERS: [(&str, &str); 7] = [
     ("shade", include_str!("shaders/shade.glsl")),
-    ("open", include_str!("shaders/open.glsl")),
-    ("sun", include_str!("shaders/sun.glsl")),
     ("surface", include_str!("shaders/surface.vert")),
     ("light", include_str!("shaders/light.frag")),
-    ("shadow", include_str!("shaders/shadow.vert")),
-    ("cast", include_str!("shaders/shadow.frag")),
-    ("lawn", include_str!("shaders/floor.vert")),
-    ("floor", include_str!("shaders/floor.frag")),
     ("puff", include_str!("shaders/puff.vert")),
     ("veil", include_str!("shaders/veil.frag")),
     ("sky", include_str!("shaders/sky.vert")),
     ("heaven", include_str!("shaders/sky.frag")),
+];
+
+/// Those that only scenes with declared light or a floor need.
+pub const SCENE_SHADERS: [(&str, &str); 6] = [
+    ("open", include_str!("shaders/open.glsl")),
+    ("sun", include_str!("shaders/sun.glsl")),
+    ("shadow", include_str!("shaders/shadow.vert")),
+    ("cast", include_str!("shaders/shadow.frag")),
+    ("lawn", include_str!("shaders/floor.vert")),
+    ("floor", include_str!("shaders/floor.frag")),
 ];
 
 /// The beginning of every page, by which it is told from files of other programs.
@@ -54,13 +59,17 @@ pub const MARK: &str = "<!doctype html>\n<!-- dlsys view: a recorded plant -->\n
 /// The document.
 pub fn document(recording: &Recording) -> String {
     let (tracks, outlines) = encode::tracks(recording);
-    let scripts = SCRIPTS.map(|script| script.trim_end()).join("\n\n");
+    let around = &recording.surroundings;
+    let is_scene = around.sun.is_some() || around.sky.is_some() || around.floor.is_some();
+    let of_scene = if is_scene { &SCENE_SCRIPTS[..] } else { &[] };
+    let scripts: Vec<&str> = of_scene.iter().chain(&SCRIPTS).map(|script| script.trim_end()).collect();
+    let scripts = scripts.join("\n\n");
     let parts = [
         ("title", escaped(&recording.title)),
         ("generator", GENERATOR.to_owned()),
         ("style", STYLE.trim_end().to_owned()),
         ("script", scripts),
-        ("description", embedded(&description(recording, &outlines))),
+        ("description", embedded(&description(recording, &outlines, is_scene))),
         ("tracks", encode::base64(&tracks)),
     ];
     let mut page = String::from(MARK);
@@ -87,7 +96,9 @@ fn escaped(text: &str) -> String {
 }
 
 /// Everything but the tracks.
-fn description(recording: &Recording, outlines: &[Vec<Spoke>]) -> Value {
+fn description(recording: &Recording, outlines: &[Vec<Spoke>], is_scene: bool) -> Value {
+    let of_scene = if is_scene { &SCENE_SHADERS[..] } else { &[] };
+    let shaders: BTreeMap<&str, &str> = of_scene.iter().chain(&SHADERS).copied().collect();
     let Recording { history, palette, forms, clouds, .. } = recording;
     let color = |material: &Material| material.color.to_string();
     let mut pictures: Vec<Texture> = Vec::new();
@@ -145,7 +156,7 @@ fn description(recording: &Recording, outlines: &[Vec<Spoke>]) -> Value {
             json!({ "eye": seen(at.eye), "aim": seen(at.aim), "angle": at.angle })
         }),
         "floor": recording.surroundings.floor.map(|height| height - recording.centre.y),
-        "shaders": SHADERS.into_iter().collect::<std::collections::BTreeMap<_, _>>(),
+        "shaders": shaders,
     })
 }
 

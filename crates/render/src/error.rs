@@ -79,4 +79,20 @@ pub enum Error {
         /// The first frame that does not fit, from 0.
         frame: usize,
     },
+    /// The camera or the sky of a frame of an animated SVG is not that of the first one.
+    #[error(
+        "frame {frame} has another camera or sky than the first, and an animated SVG has one of each; choose a film of pixels, such as --format webp"
+    )]
+    AnotherView {
+        /// Its number, from 0.
+        frame: usize,
+    },
+    /// An animated SVG has too many elements.
+    #[error(
+        "the animated SVG is too large from frame {frame} on; take fewer frames with --step, or a film of pixels, such as --format webp"
+    )]
+    AnimationTooLong {
+        /// The first frame that does not fit, from 0.
+        frame: usize,
+    },
 }

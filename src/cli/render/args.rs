@@ -35,7 +35,7 @@ pub struct RenderArgs {
     /// one scale
     #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with_all = ["seed", "events", "stats", "watch"])]
     pub seeds: Option<Seeds>,
-    /// Directory for the frames; made if it is not there. With a format of whole animations (glb, usda, webp, apng, gif, y4m) the file, or a folder for it; - is
+    /// Directory for the frames; made if it is not there. With a format of whole animations (glb, usda, webp, apng, gif, y4m, asvg) the file, or a folder for it; - is
     /// standard output, for y4m
     #[arg(short, long = "out", value_name = "DIR")]
     pub out: PathBuf,

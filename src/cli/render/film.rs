@@ -19,9 +19,9 @@ use crate::render::{self, FrameWriter, Layout};
 /// Seconds of a film of one frame.
 const STILL: f64 = 1.0;
 /// Standard output in place of a file.
-const STREAM: &str = "-";
+pub(super) const STREAM: &str = "-";
 
-fn usage(message: impl std::fmt::Display) -> Failure {
+pub(super) fn usage(message: impl std::fmt::Display) -> Failure {
     Failure::Usage(format!("error: {message}\n"))
 }
 
@@ -33,9 +33,8 @@ pub fn render(args: &RenderArgs, format: Format, stale: &(dyn Fn() -> bool + Syn
     render_run(args, format, run, stale)
 }
 
-/// Refuses flags that do not go with films, and files that are not to be written over. Returns the file; `None` is standard output.
-fn check(args: &RenderArgs, format: Format) -> Result<Option<PathBuf>, Failure> {
-    let name = format.extension();
+/// Refuses flags that do not go with a format of whole animations.
+pub(super) fn agree(args: &RenderArgs, name: &str) -> Result<(), Failure> {
     flags::survey(args)?;
     flags::of_layouts(args)?;
     if args.layout != Layout::Frames {
@@ -49,6 +48,13 @@ fn check(args: &RenderArgs, format: Format) -> Result<Option<PathBuf>, Failure> 
             "--seeds does not go with --format {name}: a film shows one plant; leave it out"
         )));
     }
+    Ok(())
+}
+
+/// Refuses flags that do not go with films, and files that are not to be written over. Returns the file; `None` is standard output.
+fn check(args: &RenderArgs, format: Format) -> Result<Option<PathBuf>, Failure> {
+    let name = format.extension();
+    agree(args, name)?;
     let is_clear = args.background.is_some_and(|background| background.0.is_none());
     if is_clear && !format.has_alpha() {
         return Err(usage(format!(
@@ -62,7 +68,7 @@ fn check(args: &RenderArgs, format: Format) -> Result<Option<PathBuf>, Failure> 
         };
     }
     let out = file_of(&args.out, &args.shared.model, name)?;
-    spare(&out, args.force, name, |start| format.begins(start))?;
+    spare(&out, args.force, &format!("a {}", name.to_uppercase()), |start| format.begins(start))?;
     Ok(Some(out))
 }
 
@@ -111,7 +117,7 @@ pub fn render_run(
 }
 
 /// When each frame ends, in seconds; the last one lasts as long as the one before.
-fn ends(args: &RenderArgs, run: &ModelRun) -> Vec<f64> {
+pub(super) fn ends(args: &RenderArgs, run: &ModelRun) -> Vec<f64> {
     let times = &run.times;
     if let Some(ends) = turntable::ends(times) {
         return ends;

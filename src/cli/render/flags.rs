@@ -53,7 +53,7 @@ pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 11] {
 pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
     if args.speed.is_some() {
         return Err(usage(
-            "--speed is for animated files; leave it out, or choose --format glb, usda, webp, apng, gif or y4m",
+            "--speed is for animated files; leave it out, or choose --format glb, usda, webp, apng, gif, y4m or asvg",
         ));
     }
     let extension = args.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
@@ -65,7 +65,7 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
         let name = args.out.with_extension("");
         let one = if args.shared.at.is_some() { "" } else { ", or `--at T` for one frame" };
         return Err(usage(format!(
-            "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj{one}; a whole film in one file is --format webp, apng, gif or y4m",
+            "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj{one}; a whole film in one file is --format webp, apng, gif, y4m or asvg",
             args.out.display(),
             name.display()
         )));

@@ -8,6 +8,7 @@
 pub(super) mod args;
 mod film;
 pub(super) mod flags;
+mod moving;
 mod shutter;
 mod turntable;
 mod watch;
@@ -48,6 +49,7 @@ fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Fail
         RenderFormat::Frames(format) => format,
         RenderFormat::Growth(format) => return export::render(args, format, stale),
         RenderFormat::Film(format) => return film::render(args, format, stale),
+        RenderFormat::Moving => return moving::render(args, stale),
     };
     flags::survey(args)?;
     flags::agree(args, format)?;
@@ -121,6 +123,7 @@ pub fn render_run(
         RenderFormat::Frames(format) => format,
         RenderFormat::Growth(format) => return export::render_run(args, format, run, stale),
         RenderFormat::Film(format) => return film::render_run(args, format, run, stale),
+        RenderFormat::Moving => return moving::render_run(args, run, stale),
     };
     let survey = flags::survey(args)?;
     flags::agree(args, format)?;

@@ -25,7 +25,8 @@ class Painter {
     const gl = (this.gl = canvas.getContext("webgl2", options));
     this.recording = recording;
     this.geometry = new Geometry(recording);
-    const { shade, open, sun, surface, light } = recording.shaders;
+    // Those of scenes are there if there is one.
+    const { shade, open = "", sun = "", surface, light } = recording.shaders;
     const { hasPictures } = this.geometry;
     // Drawings without depth are diagrams: their colours mean something, and nothing casts a shadow.
     this.relief = Math.min(1, Math.min(...recording.size) / 0.02);
