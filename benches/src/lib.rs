@@ -9,6 +9,7 @@ pub mod anabaena;
 pub mod blocks;
 pub mod chain;
 pub mod filament;
+pub mod kernels;
 pub mod measure;
 pub mod plants;
 pub mod restart;

@@ -139,6 +139,11 @@ pub fn busy(cells: usize) -> String {
     )
 }
 
+/// The same with cells that exchange so fast that the equations are stiff.
+pub fn busy_and_stiff(cells: usize) -> String {
+    busy(cells).replacen(&format!("const D = {D}"), "const D = 10000", 1)
+}
+
 /// A filament that grows and divides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Growing {

@@ -54,6 +54,13 @@ pub fn start(session: &Session, settings: Settings) -> Result<Work, String> {
     Ok(done(begin, Stats::default(), simulation.stats()))
 }
 
+/// Seconds an event of a run that returns the number of its events.
+pub fn per_event_of(run: impl FnOnce() -> u64) -> f64 {
+    let begin = Clock::now();
+    let events = std::hint::black_box(run());
+    begin.elapsed().as_secs_f64() / events as f64
+}
+
 /// The middle one of some measurements.
 pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);

@@ -1,5 +1,6 @@
 //! Re-integration and matching of contexts after events: the local algorithms against the global ones.
 
+use dlsys::session::Session;
 use dlsys::sim::{Error, Method, Scheduler, Settings};
 use proptest::prelude::*;
 
@@ -9,6 +10,16 @@ use crate::dice::Dice;
 /// A filament, maybe with branches, of cells that grow, divide, exchange and decay.
 fn tissue(seed: u64) -> String {
     let mut dice = Dice(seed);
+    let d = |dice: &mut Dice| dice.between(0.02, 0.6);
+    tissue_with(&mut dice, d)
+}
+
+/// The same whose cells exchange so fast that the equations are stiff.
+fn stiff_tissue(seed: u64) -> String {
+    tissue_with(&mut Dice(seed), |dice| 10f64.powf(dice.between(2.0, 4.5)))
+}
+
+fn tissue_with(dice: &mut Dice, d: impl FnOnce(&mut Dice) -> f64) -> String {
     let growth = dice.pick(&["0.2*x", "0.3", "0.1*x*(2 - x) + 0.05", "0.2*x + 0.001*c", "0.2*sqrt(x)"]);
     let exchange = dice.pick(&[
         "D*(l + r - 2c) - 0.1*c",
@@ -23,7 +34,7 @@ fn tissue(seed: u64) -> String {
         "F(0.5*x, c) [+ F(0.3, c)] F(0.5*x, c)",
         "F(0.3*x, 0.8*c + 0.1)",
     ]);
-    let d = dice.between(0.02, 0.6);
+    let d = d(dice);
     let mut cells = String::new();
     for i in 0..120 {
         let (x, c) = (dice.between(0.4, 1.0), dice.between(0.6, 3.0));
@@ -88,14 +99,69 @@ fn repairs_err_no_more_than_the_tolerance() {
 }
 
 #[test]
+fn repairs_of_stiff_steps_err_no_more_than_the_tolerance() {
+    let (times, mut compared) = ([0.1, 0.3, 0.5], 0);
+    for seed in 0..12 {
+        let text = stiff_tissue(seed);
+        let with = |scheduler, tolerance| {
+            run(&text, Settings { scheduler, tolerance, ..Settings::default() }, &times)
+        };
+        let exact = match with(Scheduler::Global, 1e-10) {
+            Ok(exact) => exact,
+            // The exchange that jumps at c = 1 may lead back there from both sides.
+            Err(Error::Chattering { .. }) => continue,
+            Err(error) => panic!("{error}\n{text}"),
+        };
+        compared += 1;
+        for tolerance in [1e-4, 1e-6, 1e-8] {
+            let ours = with(Scheduler::Auto, tolerance).unwrap_or_else(|e| panic!("{e}\n{text}"));
+            let error = distance(&ours, &exact, &text);
+            assert!(error <= 20.0 * tolerance, "at {tolerance:e} errs by {error:e}\n{text}");
+        }
+    }
+    assert!(compared >= 8, "{compared} tissues");
+}
+
+/// Cells that exchange fast, each of which halves what it holds once in a unit of time.
+#[test]
+fn stiff_events_cost_what_they_touch() {
+    let mut dice = Dice(5);
+    let cells: String = (0..1000)
+        .map(|_| format!("F({:.6}, {:.4}) ", dice.between(0.0, 1.0), dice.between(50.0, 200.0)))
+        .collect();
+    let text = format!(
+        "const D = 1e4\ninitial string: W(255) {cells} W(255)\n         F(u, l) < F(x, c) > F(v, r):\n  if x < 1 solve dx/dt = 1, dc/dt = D*(l + r - 2c) - 0.03*c\n  \
+         if x = 1 produce F(0, 0.5*c + 60)\n         W(l) < F(x, c) > F(v, r):\n  if x < 1 solve dx/dt = 1, dc/dt = D*(l + r - 2c) - 0.03*c\n  \
+         if x = 1 produce F(0, 0.5*c + 60)\n         F(u, l) < F(x, c) > W(r):\n  if x < 1 solve dx/dt = 1, dc/dt = D*(l + r - 2c) - 0.03*c\n  \
+         if x = 1 produce F(0, 0.5*c + 60)\n"
+    );
+    let session = Session::from_text("busy and stiff", &text, &[]).expect("a model");
+    let work = |scheduler| {
+        let settings = Settings { scheduler, ..Settings::default() };
+        let mut simulation = session.simulate(settings).expect("it starts");
+        // The first steps find out that the equations are stiff.
+        simulation.pass(0.03).expect("it runs");
+        let before = simulation.stats();
+        simulation.pass(0.09).expect("it runs");
+        let stats = simulation.stats();
+        assert!((40..80).contains(&(stats.events - before.events)), "{stats:?}");
+        stats.rhs_evaluations - before.rhs_evaluations
+    };
+    let (ours, all) = (work(Scheduler::Auto), work(Scheduler::Global));
+    assert!(4 * ours < all, "{ours} evaluations of one module, {all} if each event ends the step for all");
+}
+
+#[test]
 fn repairs_do_not_depend_on_what_is_observed() {
-    let text = tissue(3);
-    let often: Vec<f64> = (0..=200).map(|i| f64::from(i) * 0.025).collect();
-    let one = run(&text, Settings::default(), &TIMES).expect("runs");
-    let other = run(&text, Settings::default(), &often).expect("runs");
-    for (t, state) in TIMES.iter().zip(&one) {
-        let at = often.iter().position(|u| u == t).expect("observed");
-        assert_eq!(show(state), show(&other[at]));
+    let far: Vec<f64> = (0..=200).map(|i| f64::from(i) * 0.025).collect();
+    let near: Vec<f64> = far.iter().map(|t| t / 10.0).collect();
+    for (text, few, often) in [(tissue(3), TIMES.to_vec(), far), (stiff_tissue(3), vec![0.1, 0.5], near)] {
+        let one = run(&text, Settings::default(), &few).expect("runs");
+        let other = run(&text, Settings::default(), &often).expect("runs");
+        for (t, state) in few.iter().zip(&one) {
+            let at = often.iter().position(|u| (u - t).abs() < 1e-12).expect("observed");
+            assert_eq!(show(state), show(&other[at]));
+        }
     }
 }
 

@@ -95,6 +95,12 @@ pub trait OneStep {
         step.y.iter().fold(0.0, |most, y| most.max(error * tolerance * y.abs().min(1.0)))
     }
 
+    /// The estimated error of each component in the step just tried, in units of what is tolerated; empty where only the largest
+    /// one is known.
+    fn component_errors(&self) -> &[f64] {
+        &[]
+    }
+
     /// Whether the step just tried was as long as the stability of the method allows for its decay, a sign of stiffness. None for
     /// methods that are not limited by stability, or cannot tell.
     fn is_limited_by_stability(&self, _work: &Workspace, _h: f64) -> Option<bool> {

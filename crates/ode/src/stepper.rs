@@ -87,6 +87,11 @@ pub struct Stepper {
     pub overhead_is_high: bool,
     /// Nothing is searched for inside steps, so that their interior need not be as exact as their ends; see [`Stepper::refined`].
     pub is_unwatched: bool,
+    /// So many components may err by more than is tolerated in a step, if the method tells the errors of single ones: those that
+    /// the caller integrates again, [`Stepper::rough`].
+    pub spared: usize,
+    /// The components that err by more than is tolerated in the step just made.
+    rough: Vec<u32>,
     /// Start, length and end of the step just made.
     step: (SimTime, f64, SimTime),
     /// Its error, relative.
@@ -276,6 +281,7 @@ impl Stepper {
                     tries.failed = true;
                 }
                 Trial::Done { error, rounding } => {
+                    let error = self.spare(tries.scheme, error);
                     let verdict = if error.max(rounding) > 1.0 {
                         self.judge_large_error(tries, control, system, step, (error, rounding))
                     } else {
@@ -288,6 +294,28 @@ impl Stepper {
                 }
             }
         }
+    }
+
+    /// The largest error of a component that is not spared, given the largest of all.
+    fn spare(&mut self, scheme: Scheme, error: f64) -> f64 {
+        self.rough.clear();
+        let errors = self.schemes.component_errors(scheme);
+        if self.spared == 0 || self.spared >= errors.len() {
+            return error;
+        }
+        let mut sorted = errors.to_vec();
+        let (_, most, _) = sorted.select_nth_unstable_by(self.spared, |a, b| b.total_cmp(a));
+        if *most <= 1.0 {
+            let rough = errors.iter().enumerate().filter(|(_, error)| **error > 1.0);
+            self.rough.extend(rough.map(|(component, _)| component as u32));
+        }
+        *most
+    }
+
+    /// The components, in ascending order, that err by more than is tolerated in the step just made; no more than
+    /// [`Stepper::spared`].
+    pub fn rough(&self) -> &[u32] {
+        &self.rough
     }
 
     /// Judges a step whose estimated error, by truncation or by rounding, is larger than tolerated: it is rejected unless shorter

@@ -3,6 +3,7 @@
 use cpu_time::ProcessTime as Clock;
 use dlsys::sim::{Scheduler, Settings};
 use dlsys::tree::ModuleString;
+use dlsys_benches::kernels;
 use dlsys_benches::measure::duration;
 use dlsys_benches::plants::{self, Growing};
 use dlsys_benches::scale::{self, median, with};
@@ -36,12 +37,40 @@ pub fn busy() -> Outcome {
     let (auto, global) = (run(Scheduler::Auto, 1e-6)?, run(Scheduler::Global, 1e-6)?);
     let measured = format!("{} a unit of time; `global` {:.0} times that", duration(auto), global / auto);
     line("busy filament, 1,000 cells and events", &measured, "1.5 ms", Some(auto <= 1.5e-3));
+    against_kernel(&text)?;
+    stiff()?;
     let times: Vec<f64> = (1..=8).map(|k| 0.37 * f64::from(k)).collect();
     let exact = scale::states(&text, with(Scheduler::Global, 1e-10), &times)?.0;
     for tolerance in [1e-4, 1e-6, 1e-8] {
         errors("busy filament", &text, &times, &exact, tolerance)?;
     }
     Ok(())
+}
+
+/// An event of the busy filament, and what the same numerics cost in plain Rust: measured in turns.
+fn against_kernel(text: &str) -> Outcome {
+    let (mut ours, mut plain, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..ROUNDS {
+        ours.push(scale::work(text, with(Scheduler::Auto, 1e-6), 2.0, 12.0)?.per_event());
+        plain.push(scale::per_event_of(|| kernels::busy(1000, 1e-6, 12.0).0));
+        ratios.push(ours[ours.len() - 1] / plain[plain.len() - 1]);
+    }
+    let measured =
+        format!("{} : {}, ratio {:.1}", duration(median(ours)), duration(median(plain)), median(ratios));
+    line("busy filament, an event, dlsys : the same numerics in plain Rust", &measured, "", None);
+    Ok(())
+}
+
+/// The busy filament whose cells exchange so fast that its equations are stiff.
+fn stiff() -> Outcome {
+    let text = plants::busy_and_stiff(1000);
+    let one = |_| Ok(scale::work(&text, with(Scheduler::Auto, 1e-6), 1.0, 1.2)?.per_event());
+    let event = median((0..ROUNDS).map(one).collect::<Result<_, String>>()?);
+    line("busy and stiff filament, 1,000 cells, an event", &duration(event), "", None);
+    let times = [0.05, 0.1, 0.15, 0.2];
+    let text = plants::busy_and_stiff(200);
+    let exact = scale::states(&text, with(Scheduler::Global, 1e-10), &times)?.0;
+    errors("busy and stiff filament, 200 cells", &text, &times, &exact, 1e-6)
 }
 
 /// How far `auto` and `global` are from the reference.

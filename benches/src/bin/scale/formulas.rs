@@ -2,16 +2,13 @@
 
 use cpu_time::ProcessTime as Clock;
 use dlsys::sim::Settings;
+use dlsys_benches::kernels;
 use dlsys_benches::measure::duration;
 use dlsys_benches::plants::{self, Branches, Growing, Lives};
 use dlsys_benches::scale::{self, median};
 use dlsys_benches::solver;
 
 use crate::{Outcome, ROUNDS, line};
-
-/// Seconds that cpfg (of L-studio 4) took for the dragon curve to t = 16, in 12.5 million module steps: a note of
-/// another run, which this program cannot repeat.
-const CPFG_DRAGON: f64 = 1.3;
 
 /// Seconds that a measurement of branches may take.
 const LIMIT: f64 = 12.0;
@@ -49,19 +46,38 @@ pub fn productions() -> Outcome {
         let measured = format!("{} and {}: ratio {:.2}", duration(few), duration(many), many / few);
         line(&what, &measured, "0.3 µs", Some(few.max(many) <= 0.3e-6));
     }
+    for (n, units) in [(1_000, 1000.0), (1_000_000, 3.0)] {
+        let text = Lives::Various.text(n);
+        let (mut ours, mut heap, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
+        for _ in 0..ROUNDS {
+            ours.push(scale::work(&text, Settings::default(), 2.0, 2.0 + units)?.per_event());
+            heap.push(scale::per_event_of(|| kernels::lives(n, 2.0 + units).0));
+            ratios.push(ours[ours.len() - 1] / heap[heap.len() - 1]);
+        }
+        let (ours, heap, ratio) = (duration(median(ours)), duration(median(heap)), median(ratios));
+        let measured = format!("{ours} : {heap}, ratio {ratio:.1}");
+        let what = format!("an event, lives that change, {n} modules, dlsys : a heap in plain Rust");
+        line(&what, &measured, "2", Some(ratio <= 2.0));
+    }
     Ok(())
 }
 
 pub fn dragon() -> Outcome {
     let session = solver::session(scale::DRAGON)?;
-    for (what, frames, target) in [("state at the end", 1, 40.0), ("1,024 frames formed", 1024, 8.0)] {
-        let one = |_| Ok(scale::observed(&session, 16.0, frames)?.0);
-        let once = median((0..ROUNDS).map(one).collect::<Result<_, String>>()?);
-        let ratio = CPFG_DRAGON / once;
-        let measured = format!("{}: cpfg's {CPFG_DRAGON} s is {ratio:.1} times that", duration(once));
-        let target = format!("{target} times").replace(".0", "");
-        let met = ratio >= if frames == 1 { 40.0 } else { 8.0 };
-        line(&format!("dragon to t = 16, {what}"), &measured, &target, Some(met));
+    for (what, frames) in [("state at the end", 1), ("1,024 frames formed", 1024)] {
+        let (mut ours, mut euler, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
+        for _ in 0..ROUNDS {
+            ours.push(scale::observed(&session, 16.0, frames)?.0);
+            let begin = Clock::now();
+            std::hint::black_box(kernels::dragon_by_euler(1.0 / 64.0, 16.0));
+            euler.push(begin.elapsed().as_secs_f64());
+            ratios.push(ours[ours.len() - 1] / euler[euler.len() - 1]);
+        }
+        let measured =
+            format!("{} : {}, ratio {:.2}", duration(median(ours)), duration(median(euler)), median(ratios));
+        let what =
+            format!("dragon to t = 16, {what}, dlsys : forward Euler with steps of 1/64 in plain Rust");
+        line(&what, &measured, "", None);
     }
     Ok(())
 }

@@ -117,6 +117,10 @@ macro_rules! methods {
                 match scheme { $(Scheme::$variant => self.$field.absolute_error(work, step, error, tolerance),)* }
             }
 
+            pub fn component_errors(&self, scheme: Scheme) -> &[f64] {
+                match scheme { $(Scheme::$variant => self.$field.component_errors(),)* }
+            }
+
             pub fn is_limited_by_stability(&self, scheme: Scheme, work: &Workspace, h: f64) -> Option<bool> {
                 match scheme { $(Scheme::$variant => self.$field.is_limited_by_stability(work, h),)* }
             }

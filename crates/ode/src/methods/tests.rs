@@ -102,3 +102,52 @@ fn the_measured_interior_error_is_close_to_the_true_one() {
         assert!(measured >= 0.75 * worst && measured <= 2.0 * worst, "z = {z}: {measured}, not {worst}");
     }
 }
+
+/// y' = -rate (y - 1) for each component.
+struct Relaxation(Vec<f64>);
+
+impl Rates for Relaxation {
+    fn rates(&mut self, _: f64, y: &[f64], out: &mut [f64]) {
+        for (out, (rate, y)) in out.iter_mut().zip(self.0.iter().zip(y)) {
+            *out = rate * (1.0 - y);
+        }
+    }
+
+    fn couplings(&self) -> Vec<(u32, u32)> {
+        (0..self.0.len() as u32).map(|i| (i, i)).collect()
+    }
+
+    fn partials(&mut self, _: f64, _: &[f64], out: &mut Vec<f64>) {
+        out.clear();
+        out.extend(self.0.iter().map(|rate| -rate));
+    }
+
+    fn modules(&self) -> u64 {
+        1
+    }
+}
+
+/// A component that relaxes a thousand times as fast as the others shortens the step for all, unless it is spared; then it
+/// is named, and the others are as exact as ever.
+#[test]
+fn a_component_that_is_spared_does_not_shorten_the_step() {
+    let mut system = Relaxation(vec![1.0, 1.5, 1000.0, 2.0, 1.2]);
+    let settings = crate::StepSettings { method: Method::Radau, tolerance: 1e-6, step_size: 1.0 };
+    let y = vec![2.0; 5];
+    let step = |spared: usize, system: &mut Relaxation| {
+        let mut stepper = crate::Stepper::default();
+        stepper.spared = spared;
+        let mut control = crate::Control { size: 0.1, ..Default::default() };
+        stepper.restart(settings.method, y.len());
+        let end = stepper.step(&settings, &mut control, system, &y, SimTime::ZERO, None).expect("a step");
+        (end.to_f64(), stepper.rough().to_vec(), stepper.end_mut().to_vec())
+    };
+    let (short, none, _) = step(0, &mut system);
+    assert!(short < 0.02 && none.is_empty(), "{short} {none:?}");
+    let (long, rough, end) = step(1, &mut system);
+    assert_eq!((long, rough), (0.1, vec![2]));
+    for i in [0, 1, 3, 4] {
+        let exact = 1.0 + (-system.0[i] * long).exp();
+        assert!((end[i] - exact).abs() < 1e-8, "{} for {exact}", end[i]);
+    }
+}

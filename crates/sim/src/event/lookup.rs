@@ -9,8 +9,28 @@ use std::collections::HashSet;
 use crate::event::{LONG, clear};
 use crate::world::context::Context;
 use crate::world::state::{Signs, State};
-use dlsys_model::KindId;
+use dlsys_model::{KindId, Rule, Sign};
 use dlsys_tree::ModuleId;
+
+/// True if a module whose neighbours have been replaced goes on as it was, but for the inputs of its common step: it is
+/// integrated with its neighbours already, and neither its conditions nor its formulas read them. So its signs, its clause
+/// and its own events stay, and most events of a tissue concern one module, not three.
+fn goes_on(state: &State, rule: &Rule, number: usize, context: &Context) -> bool {
+    if state.rule != Some(number) || !state.coupled || state.open.is_some() {
+        return false;
+    }
+    let Some(clause) = state.solve.map(|solve| &rule.solves[solve]) else { return false };
+    // A zero sign may go elsewhere with another neighbour.
+    let is_clear = |sign: &Sign| matches!(sign, Sign::Plus | Sign::Minus);
+    let (own, all) = (rule.parameters.len(), rule.variables - 2);
+    let reads_own = |reads: &[bool]| !reads.get(own..all).unwrap_or_default().contains(&true);
+    state.context.len() == context.len()
+        && rule.aggregates.is_empty()
+        && !rule.is_algebraic()
+        && state.signs.iter().all(is_clear)
+        && reads_own(&rule.watched)
+        && reads_own(clause.stepping.formulas_read())
+}
 
 impl EventStage<'_, '_> {
     /// Finds the rule and context of every module for which they may be new, and opens it if they are.
@@ -83,8 +103,12 @@ impl EventStage<'_, '_> {
                 }
                 continue;
             };
-            if state.is_none_or(|s| s.rule != Some(rule) || s.context != context) {
-                self.take_up(id, rule, &context);
+            match state {
+                Some(s) if s.rule == Some(rule) && s.context == context => {}
+                Some(s) if goes_on(s, &model.rules[rule], rule, &context) => {
+                    self.exchange_neighbours(id, &context);
+                }
+                _ => self.take_up(id, rule, &context),
             }
         }
         self.events.to_look = to_look;
@@ -92,6 +116,14 @@ impl EventStage<'_, '_> {
         self.events
             .opened
             .retain(|id| world.state(*id).is_some_and(|s| s.rule.is_some()) || world.is_lazy(*id));
+    }
+
+    /// Gives a module that goes on as it was the neighbours that have come in the place of others.
+    fn exchange_neighbours(&mut self, id: ModuleId, context: &Context) {
+        let state = self.world.state_mut(id).expect("a module that goes on");
+        let left = state.context.iter().filter(|seen| !context.contains(seen));
+        self.flows.coupled.loosened.extend(left);
+        state.context.clone_from(context);
     }
 
     /// Gives a module its rule and opens it.

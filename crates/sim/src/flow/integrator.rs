@@ -63,6 +63,16 @@ impl Integrator {
         self.stepper.is_unwatched
     }
 
+    /// Lets so many components of a stiff step err by more than is tolerated: those that are integrated again.
+    pub fn spare(&mut self, components: usize) {
+        self.stepper.spared = components;
+    }
+
+    /// The components, in ascending order, that err by more than is tolerated in the step just made.
+    pub fn rough(&self) -> &[u32] {
+        self.stepper.rough()
+    }
+
     /// The positions in the step just made, from 0 to 1, at which the rates were evaluated that its error estimate
     /// depends on.
     pub fn nodes(&self) -> Nodes {

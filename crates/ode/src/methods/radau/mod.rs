@@ -130,6 +130,10 @@ impl OneStep for Radau {
         }
     }
 
+    fn component_errors(&self) -> &[f64] {
+        self.stages.as_ref().map_or(&[], Stages::component_errors)
+    }
+
     /// The end of the step is `start + h`, whatever else is known of it.
     fn dense(&mut self, _: &mut Workspace, _: &mut impl Rates, step: Step<'_>, _: Option<SimTime>) -> Dense {
         let count = self.stages.as_ref().map_or(0, |stages| {

@@ -46,6 +46,8 @@ pub struct Newton<const S: usize, const L: usize> {
     rates: Vec<f64>,
     point: Vec<f64>,
     weight: Vec<f64>,
+    /// The estimated error of each component, in units of what is tolerated.
+    pub shares: Vec<f64>,
     pub end: Vec<f64>,
     h: f64,
     /// Length of the step `before`, if there is one that ended here.
@@ -85,6 +87,7 @@ impl<const S: usize, const L: usize> Newton<S, L> {
             rates: Vec::new(),
             point: Vec::new(),
             weight: Vec::new(),
+            shares: Vec::new(),
             end: Vec::new(),
             h: 0.0,
             h_before: None,
@@ -348,8 +351,9 @@ impl<const S: usize, const L: usize> Newton<S, L> {
             self.rhs[i] = Wide::from_f64(v);
         }
         start.pattern.solve(&self.factors, &mut self.rhs);
-        let shares = self.rhs.iter().zip(&self.weight).map(|(e, w)| (e.re[0] * w).abs());
-        shares.fold(0.0, |m, v| if v > m || v.is_nan() { v } else { m })
+        self.shares.clear();
+        self.shares.extend(self.rhs.iter().zip(&self.weight).map(|(e, w)| (e.re[0] * w).abs()));
+        self.shares.iter().fold(0.0, |m, &v| if v > m || v.is_nan() { v } else { m })
     }
 
     pub fn dense(&self, y: &[f64], out: &mut Vec<f64>) {

@@ -88,6 +88,11 @@ impl Stages {
         each!(self, newton => newton.attempt(problem, start, h))
     }
 
+    /// The estimated error of each component in the last attempt done, as a share of the allowed one.
+    pub fn component_errors(&self) -> &[f64] {
+        each!(self, newton => &newton.shares)
+    }
+
     /// Says that the next attempt continues at the end of the last one, if that was done.
     pub fn accept(&mut self) {
         each!(self, newton => newton.accept());

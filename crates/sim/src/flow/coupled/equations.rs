@@ -143,6 +143,14 @@ impl Equations<'_> {
         self.memory.registers = registers;
     }
 
+    /// The largest effect of one component on the rate of another at the start of a step.
+    pub fn strength(&mut self, y: &[f64]) -> f64 {
+        let mut values = Vec::new();
+        self.partials(0.0, y, &mut values);
+        let others = self.couplings().into_iter().zip(values).filter(|((row, column), _)| row != column);
+        others.fold(0.0, |most, (_, value)| value.abs().max(most))
+    }
+
     /// The algebraic equations that become singular at the start of a step, if there are any.
     pub fn fading(&mut self, y: &[f64]) -> Option<AlgebraicError> {
         self.read_inputs(0.0);

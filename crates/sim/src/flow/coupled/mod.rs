@@ -7,6 +7,7 @@
 //! ```text
 //! couple ─▶ which modules are coupled ─▶ reintegration   the modules around an event, to the end of the common step
 //!                                     └▶ step            a new common step ─▶ detect ─▶ schedule
+//!                                        step ─▶ repair   stiff members that the step does not resolve
 //! system ─▶ rows (table of equations) ─▶ algebra, lanes, aggregates ─▶ equations (right-hand side) ─▶ integrator
 //! linear ─▶ exponentials of matrices in place of steps
 //! ```
@@ -20,6 +21,7 @@ pub mod lanes;
 pub mod linear;
 pub mod prefetch;
 pub mod reintegration;
+mod repair;
 pub mod rows;
 mod step;
 pub mod system;

@@ -17,6 +17,14 @@
 //! change is one more local error for each event, and accumulates as those do. Where the influence of neighbours is
 //! weak (diffusion between cells), it falls by a factor of about L h / k from ring k - 1 to ring k, and a handful of
 //! rings is enough.
+//!
+//! # Stiff equations
+//!
+//! Steps are implicit, and L h is large, but what decays does not grow: the equations outside carry the disturbance on
+//! without adding to it, so it changes their values by at most L h times the change of the outermost ring. Regions are
+//! therefore made so large that this change is below ε / (1 + L h), with the largest partial derivative by another
+//! component as L. Where values diffuse, influence reaches as far as the square root of the time, and falls faster than
+//! exponentially beyond that.
 
 use crate::flow::FlowStage;
 use crate::flow::coupled::equations::{Equations, RateWorkspace};
@@ -39,6 +47,10 @@ pub struct Reintegration {
     control: Control,
     /// The number of rings with which the next one begins.
     rings: usize,
+    /// The same in stiff equations, by cause.
+    reaches: [StiffReach; 2],
+    /// The largest effect of one component on the rate of another in the region, in stiff equations.
+    strength: f64,
     /// By component of the coupled solution: its number in the system of the region, or [`NOT_HERE`].
     numbers: Vec<u32>,
     /// The equations of the region.
@@ -51,11 +63,42 @@ pub struct Reintegration {
     visit: u64,
 }
 
+/// The reason why modules are integrated again.
+#[derive(Clone, Copy)]
+pub enum Cause {
+    /// An event has changed their equations or inputs.
+    Event,
+    /// The common step does not resolve them.
+    Roughness,
+}
+
+/// The experience of re-integrations in stiff equations, where influence diffuses; 0 if there is none.
+#[derive(Clone, Copy, Default)]
+struct StiffReach {
+    /// Rings for the square root of a unit of time.
+    spread: f64,
+    /// The length of the first step of the last one.
+    first: f64,
+}
+
 impl Default for Reintegration {
     fn default() -> Reintegration {
         let (integrator, control, numbers, system, memory) = Default::default();
         let (region, trial, y) = Default::default();
-        Reintegration { integrator, control, rings: 3, numbers, system, memory, region, trial, y, visit: 0 }
+        Reintegration {
+            integrator,
+            control,
+            rings: 3,
+            reaches: Default::default(),
+            strength: 0.0,
+            numbers,
+            system,
+            memory,
+            region,
+            trial,
+            y,
+            visit: 0,
+        }
     }
 }
 
@@ -70,6 +113,27 @@ impl Reintegration {
         self.integrator.evaluations()
     }
 
+    /// The number of rings with which a re-integration over so much time begins.
+    fn rings_within(&self, room: f64, stiff: Option<Cause>) -> usize {
+        stiff.map_or(self.rings, |cause| {
+            let rings = (self.reaches[cause as usize].spread * room.sqrt()).ceil();
+            (rings as usize).clamp(FEW_RINGS, MAX_STIFF_RINGS)
+        })
+    }
+
+    /// Remembers how many rings were needed over so much time.
+    fn learn(&mut self, rings: usize, room: f64, stiff: Option<Cause>) {
+        match stiff {
+            // An attempt with too few rings costs more than a ring too many. A very short time says little.
+            Some(cause) => {
+                let spread = &mut self.reaches[cause as usize].spread;
+                let found = SPARE_RINGS * rings as f64 / room.sqrt();
+                *spread = if *spread > 0.0 { found.min(2.0 * *spread) } else { found };
+            }
+            None => self.rings = rings.clamp(1, MAX_RINGS),
+        }
+    }
+
     /// The id of a new traversal of modules, which distinguishes the modules that it has visited.
     pub fn begin_visit(&mut self) -> u64 {
         self.visit += 1;
@@ -79,6 +143,13 @@ impl Reintegration {
 
 /// Most rings that are tried.
 const MAX_RINGS: usize = 64;
+/// Least and most rings that are tried in stiff equations.
+const FEW_RINGS: usize = 3;
+const MAX_STIFF_RINGS: usize = 4096;
+/// The factor by which more rings are tried than were needed before.
+const SPARE_RINGS: f64 = 1.15;
+/// In stiff equations the first step is tried so many times as long as that of the last re-integration.
+const BOLD: f64 = 1.5;
 /// Most steps of a re-integration.
 const MAX_STEPS: usize = 64;
 /// A region of more than this part of all coupled modules is replaced by a new common step.
@@ -113,54 +184,72 @@ impl FlowStage<'_, '_> {
     /// Integrates some coupled modules, some of which have just joined, and their neighbours again from now on. False
     /// if a new common step does that better.
     pub fn reintegrate(&mut self, seeds: &[ModuleId], joined: &[ModuleId]) -> bool {
-        let Some(solution) = &self.world.coupled else { return false };
-        let room = solution.end.since(self.instant.at);
-        if self.is_cut_by_events() || room <= 64.0 * self.instant.at.resolution() {
+        let now = self.instant.at;
+        if self.world.coupled.is_none()
+            || self.is_cut_by_events()
+            || self.room(now) <= 64.0 * now.resolution()
+        {
             return false;
         }
         self.number_newcomers(seeds);
-        let (region, trial) =
-            (&mut self.flows.coupled.reintegration.region, &mut self.flows.coupled.reintegration.trial);
-        let (mut region, mut trial) = (std::mem::take(region), std::mem::take(trial));
-        let reintegrated = self.reintegrate_within(&mut region, &mut trial, seeds, joined);
-        trial.stretches.clear();
-        (self.flows.coupled.reintegration.region, self.flows.coupled.reintegration.trial) = (region, trial);
+        let mut region = std::mem::take(&mut self.flows.coupled.reintegration.region);
+        let mut reintegrated = self.solve_again(&mut region, seeds, now, Cause::Event);
+        if reintegrated {
+            self.flows.coupled.members.extend_from_slice(joined);
+            self.accept(&region);
+            // A common step that begins now finds the pulses that have been overlooked.
+            reintegrated = !self.is_overlooked(&region.members);
+        }
+        self.flows.coupled.reintegration.region = region;
         reintegrated
     }
 
-    fn reintegrate_within(
-        &mut self,
-        region: &mut Region,
-        trial: &mut TrialSolution,
-        seeds: &[ModuleId],
-        joined: &[ModuleId],
-    ) -> bool {
+    /// Integrates members that the common step, which begins now, does not resolve, and their neighbours again. False if
+    /// a shorter common step does that better.
+    pub fn resolve(&mut self, seeds: &[ModuleId], now: SimTime) -> bool {
+        let mut region = std::mem::take(&mut self.flows.coupled.reintegration.region);
+        let resolved = self.solve_again(&mut region, seeds, now, Cause::Roughness);
+        self.flows.coupled.reintegration.region = region;
+        resolved
+    }
+
+    /// The time from an instant to the end of the common step.
+    fn room(&self, now: SimTime) -> f64 {
+        self.world.coupled.as_ref().map_or(0.0, |solution| solution.end.since(now))
+    }
+
+    /// Finds the region of some modules, and makes its new trajectory from an instant on a part of the coupled solution.
+    fn solve_again(&mut self, region: &mut Region, seeds: &[ModuleId], now: SimTime, cause: Cause) -> bool {
         // Within a slice of time no module reads changes of others.
         let sliced = self.setup.settings.is_sliced();
-        let mut rings = if sliced { 0 } else { self.flows.coupled.reintegration.rings };
-        loop {
+        let (room, stiff) = (self.room(now), self.flows.coupled.control.stiff.then_some(cause));
+        let mut rings = if sliced { 0 } else { self.flows.coupled.reintegration.rings_within(room, stiff) };
+        let mut trial = std::mem::take(&mut self.flows.coupled.reintegration.trial);
+        let solved = loop {
             self.surround(region, seeds, rings);
             if !sliced && region.members.len() as f64 > MOST * self.flows.coupled.members.len() as f64 {
-                return false;
+                self.flows.coupled.reintegration.reaches[cause as usize].spread *= 0.5;
+                break false;
             }
-            if self.integrate(region, trial).is_none() {
-                return false;
+            if self.integrate(region, &mut trial, now, stiff).is_none() {
+                break false;
             }
-            let reach = if sliced { 0 } else { self.reach(trial) };
+            let reach = if sliced { 0 } else { self.reach(&trial, room) };
             let closed = region.rings.len() <= rings;
             if reach < region.rings.len() || closed {
                 // The next re-integration begins with one ring beyond the last that changed.
-                self.flows.coupled.reintegration.rings = (reach + 1).clamp(1, MAX_RINGS);
-                self.flows.coupled.members.extend_from_slice(joined);
-                self.accept(region, trial);
-                // A common step that begins now finds the pulses that have been overlooked.
-                return !self.is_overlooked(&region.members);
+                self.flows.coupled.reintegration.learn(reach + 1, room, stiff);
+                self.adopt(&mut trial);
+                break true;
             }
-            rings *= 2;
-            if rings > MAX_RINGS {
-                return false;
+            rings += if stiff.is_some() { rings / 2 + 1 } else { rings };
+            if rings > if stiff.is_some() { MAX_STIFF_RINGS } else { MAX_RINGS } {
+                break false;
             }
-        }
+        };
+        trial.stretches.clear();
+        self.flows.coupled.reintegration.trial = trial;
+        solved
     }
 
     /// Gives components to the parameters of modules that have begun new trajectories.
@@ -224,11 +313,18 @@ impl FlowStage<'_, '_> {
         }
     }
 
-    /// Integrates a region from now to the end of the common step; None if the steps do not come that far.
-    fn integrate(&mut self, region: &Region, trial: &mut TrialSolution) -> Option<()> {
+    /// Integrates a region from an instant to the end of the common step; None if the steps do not come that far. `stiff`
+    /// tells why, if the equations are stiff.
+    fn integrate(
+        &mut self,
+        region: &Region,
+        trial: &mut TrialSolution,
+        now: SimTime,
+        stiff: Option<Cause>,
+    ) -> Option<()> {
         let solution = self.world.coupled.as_ref()?;
         let TrialSolution { stretches, components, rings } = trial;
-        let Reintegration { integrator, control, numbers, system, memory, y, .. } =
+        let Reintegration { integrator, control, numbers, system, memory, y, reaches, strength, .. } =
             &mut self.flows.coupled.reintegration;
         stretches.clear();
         components.clear();
@@ -242,7 +338,7 @@ impl FlowStage<'_, '_> {
             for &parameter in integrated(self.setup.model, state) {
                 if let Trajectory::Coupled(component) = state.trajectories[parameter] {
                     components.push(component);
-                    y.push(solution.value(component as usize, self.instant.at).unwrap_or(values[parameter]));
+                    y.push(solution.value(component as usize, now).unwrap_or(values[parameter]));
                 }
             }
         }
@@ -255,7 +351,7 @@ impl FlowStage<'_, '_> {
         let number = |component: u32| numbers.get(component as usize).copied().filter(|n| *n != NOT_HERE);
         let rules = &self.setup.model.rules;
         let frozen = self.setup.settings.is_sliced();
-        let (world, members, start) = (&*self.world, &region.members, self.instant.at);
+        let (world, members, start) = (&*self.world, &region.members, now);
         system.rebuild(rules, &Membership { world, members, start, frozen }, number);
         for &component in &*components {
             numbers[component as usize] = NOT_HERE;
@@ -264,7 +360,14 @@ impl FlowStage<'_, '_> {
         // The neglected change at the edge of the region adds to the error.
         control.error =
             self.flows.coupled.control.error + INNER_TOLERANCE * self.setup.coupled_settings.tolerance;
-        let mut from = self.instant.at;
+        if let Some(cause) = stiff {
+            // After an event all changes fast again, however long the last steps were.
+            (control.stiff, control.size) = (true, BOLD * reaches[cause as usize].first);
+            let mut equations = Equations::within(std::mem::take(memory), system, rules, Some(solution));
+            *strength = equations.strength(y);
+            *memory = equations.memory;
+        }
+        let mut from = now;
         while solution.end.since(from) > 0.0 {
             if stretches.len() >= MAX_STEPS {
                 return None;
@@ -284,6 +387,9 @@ impl FlowStage<'_, '_> {
                 );
             }
             *memory = equations.memory;
+            if let (Some(cause), 1) = (stiff, stretches.len()) {
+                reaches[cause as usize].first = stretches[0].h;
+            }
             integrator.advance(y);
             if solution.end.since(from) > 0.0 {
                 system.advance(from);
@@ -293,10 +399,14 @@ impl FlowStage<'_, '_> {
     }
 
     /// The number of rings that a trial changes by more than the part that may be neglected.
-    fn reach(&self, trial: &TrialSolution) -> usize {
+    fn reach(&self, trial: &TrialSolution, room: f64) -> usize {
         let Some(solution) = &self.world.coupled else { return 0 };
         let tolerance = INNER_TOLERANCE * self.setup.coupled_settings.tolerance;
         let tolerance = if self.setup.gathers { tolerance.min(CONSERVED) } else { tolerance };
+        let tolerance = match self.flows.coupled.control.stiff {
+            true => tolerance / (1.0 + self.flows.coupled.reintegration.strength * room),
+            false => tolerance,
+        };
         let changes = |number: usize, component: u32| {
             trial.stretches.iter().any(|dense| {
                 [0.5, 1.0].into_iter().any(|position| {
@@ -312,16 +422,20 @@ impl FlowStage<'_, '_> {
         last.map_or(0, |(number, _)| trial.rings.partition_point(|first| *first <= number))
     }
 
-    /// Makes a trial the trajectory of its region, and finds the next events of the region.
-    fn accept(&mut self, region: &Region, trial: &mut TrialSolution) {
+    /// Makes a trial the trajectory of its region.
+    fn adopt(&mut self, trial: &mut TrialSolution) {
         let all = self.flows.coupled.system.table.places.len();
         let solution: &mut CoupledSolution = self.world.coupled.as_mut().expect("seen above");
         solution.replace(&mut trial.stretches, &trial.components, all);
         self.flows.coupled.reintegrated = true;
-        self.flows.coupled.traffic.note_event();
         let tolerance = self.setup.coupled_settings.tolerance;
         let known = &mut self.flows.coupled.control.error;
         *known = (*known + INNER_TOLERANCE * tolerance).min(CERTAINTY * tolerance);
+    }
+
+    /// Finds the next events of a region that has been integrated again from now on.
+    fn accept(&mut self, region: &Region) {
+        self.flows.coupled.traffic.note_event();
         let now: SimTime = self.instant.at;
         for &id in &region.members {
             let state = self.world.state_mut(id).expect("a member");

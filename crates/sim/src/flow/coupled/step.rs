@@ -9,6 +9,7 @@ use crate::flow::coupled::equations::Equations;
 use crate::flow::coupled::linear::Linear;
 use crate::flow::coupled::prefetch::prefetch;
 use crate::flow::coupled::system::{Membership, integrated};
+use crate::flow::coupled::traffic::Work;
 use crate::flow::independent::crawls;
 use crate::flow::integrator::{StepError, StepRequest};
 use crate::schedule::Owner;
@@ -26,6 +27,9 @@ const MAX_TRIES: usize = 100;
 
 /// A solution without steps begins anew, for all modules, at every event; after this many events steps are made.
 const MAX_CUTS: u32 = 2;
+
+/// The part of a common step's length that is tried where too many members would have to be integrated again.
+const SHORTER: f64 = 0.25;
 
 /// A common step: its end, and its dense output if that has been computed.
 type CommonStep = (Result<SimTime, StepError>, Option<CoupledSolution>);
@@ -168,13 +172,22 @@ impl FlowStage<'_, '_> {
 
     /// Makes a step of the coupled modules and searches it.
     fn step_coupled(&mut self, from: SimTime) -> Result<(), Error> {
-        let (step, solution) = self.make_step(from);
-        let end = match step {
-            Ok(end) => end,
-            Err(error) => return self.fail_step(error, from),
+        let mut may_spare = true;
+        let end = loop {
+            let (step, solution) = self.make_step(from, may_spare);
+            let end = match step {
+                Ok(end) => end,
+                Err(error) => return self.fail_step(error, from),
+            };
+            self.flows.coupled.pending = solution.is_none();
+            self.world.coupled = solution;
+            if self.repair(from) {
+                break end;
+            }
+            // The members that were spared are too many.
+            may_spare = false;
+            self.flows.coupled.control.size = SHORTER * end.since(from);
         };
-        self.flows.coupled.pending = solution.is_none();
-        self.world.coupled = solution;
         let members = std::mem::take(&mut self.flows.coupled.members);
         for (at, &id) in members.iter().enumerate() {
             prefetch(self.world, &members, at);
@@ -187,12 +200,16 @@ impl FlowStage<'_, '_> {
 
     /// Makes a step that resolves the algebraic components and overlooks no pulse; shorter ones are tried until one
     /// does.
-    fn make_step(&mut self, from: SimTime) -> CommonStep {
+    fn make_step(&mut self, from: SimTime, may_spare: bool) -> CommonStep {
         let rules = &self.setup.model.rules;
-        let longest = self.flows.coupled.traffic.begin(from, self.flows.coupled.members.len());
+        let Coupled { traffic, members, integrator, reintegration, control, .. } = &mut self.flows.coupled;
+        let work = Work { common: integrator.evaluations(), regions: reintegration.evaluations() };
+        let longest = traffic.begin(from, members.len(), control.stiff.then_some(work));
         let limits = [self.setup.settings.slice_end(from), longest, self.world.resolved(from)];
         let limit = limits.into_iter().flatten().reduce(|a, b| if b < a { b } else { a });
         let settings = &self.setup.coupled_settings;
+        let spared = if may_spare { self.spared() } else { 0 };
+        self.flows.coupled.integrator.spare(spared);
         let (mut solution, mut tries) = (None, 0);
         let step = loop {
             let Coupled { system, y, integrator, control, pulsing, .. } = &mut self.flows.coupled;
@@ -359,7 +376,6 @@ impl FlowStage<'_, '_> {
         self.setup.settings.scheduler == Scheduler::Global
             || self.setup.settings.method.is_fixed_step()
             || self.setup.settings.method.is_implicit()
-            || self.flows.coupled.control.stiff
             || self.flows.coupled.linear.is_some()
     }
 
@@ -386,7 +402,7 @@ impl FlowStage<'_, '_> {
             return false;
         }
         let pulsing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_pulse(*id)).collect();
-        let how = (self.setup.coupled_settings.tolerance, false);
+        let how = (self.setup.coupled_settings.tolerance, self.flows.coupled.control.stiff);
         let (world, rules, pulses) = (&self.world, &self.setup.model.rules, &mut self.detector.pulses);
         let nodes = &*self.flows.coupled.reintegration.nodes();
         pulsing.into_iter().any(|id| {
