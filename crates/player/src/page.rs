@@ -62,7 +62,7 @@ pub fn document(recording: &Recording) -> String {
     let around = &recording.surroundings;
     let is_scene = around.sun.is_some() || around.sky.is_some() || around.floor.is_some();
     let of_scene = if is_scene { &SCENE_SCRIPTS[..] } else { &[] };
-    let scripts: Vec<&str> = of_scene.iter().chain(&SCRIPTS).map(|script| script.trim_end()).collect();
+    let scripts: Vec<String> = of_scene.iter().chain(&SCRIPTS).map(|script| bare(script)).collect();
     let scripts = scripts.join("\n\n");
     let parts = [
         ("title", escaped(&recording.title)),
@@ -85,6 +85,12 @@ pub fn document(recording: &Recording) -> String {
     page
 }
 
+/// A script or a shader without the lines of its comments, which stand in the sources.
+fn bare(text: &str) -> String {
+    let lines = text.trim_end().lines().filter(|line| !line.trim_start().starts_with("//"));
+    lines.flat_map(|line| [line, "\n"]).collect()
+}
+
 /// JSON that may stand in a script element: nothing in it can end that.
 fn embedded(value: &Value) -> String {
     value.to_string().replace('<', "\\u003c").replace('\u{2028}', "\\u2028").replace('\u{2029}', "\\u2029")
@@ -98,7 +104,8 @@ fn escaped(text: &str) -> String {
 /// Everything but the tracks.
 fn description(recording: &Recording, outlines: &[Vec<Spoke>], is_scene: bool) -> Value {
     let of_scene = if is_scene { &SCENE_SHADERS[..] } else { &[] };
-    let shaders: BTreeMap<&str, &str> = of_scene.iter().chain(&SHADERS).copied().collect();
+    let shaders: BTreeMap<&str, String> =
+        of_scene.iter().chain(&SHADERS).map(|(name, shader)| (*name, bare(shader))).collect();
     let Recording { history, palette, forms, clouds, .. } = recording;
     let color = |material: &Material| material.color.to_string();
     let mut pictures: Vec<Texture> = Vec::new();
