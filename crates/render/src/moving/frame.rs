@@ -49,8 +49,7 @@ impl Frame {
         let mut names: Vec<(String, String)> = Vec::new();
         let mut items: Vec<Item> = Vec::new();
         let mut group: Option<(String, usize)> = None;
-        let mut lines = elements.lines();
-        while let Some(line) = lines.next() {
+        for line in elements.lines() {
             if line.starts_with("<linearGradient") {
                 let (name, rest) = without_id(&renamed(line, &names));
                 let number = gradient(&rest);
