@@ -175,11 +175,14 @@ fn an_animated_svg_shows_each_frame() {
     }
 }
 
+fn render<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    [&["render", "models/dragon.dls", "--format", "asvg"][..], more].concat()
+}
+
 #[test]
 fn an_animated_svg_has_one_camera_and_no_pixels() {
     let folder = tempfile::tempdir().expect("a folder");
     let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
-    let render = |more: &[&str]| [&["render", "models/dragon.dls", "--format", "asvg"][..], more].concat();
     let (status, said) = bad(&render(&["-o", &at("a.svg"), "--shutter", "0.5"]));
     assert!(status == 2 && said.contains("averages pixels"), "{said}");
     let (status, said) = bad(&render(&["-o", &at("a.png")]));
