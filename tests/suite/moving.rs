@@ -29,9 +29,10 @@ fn lines(document: &str) -> (Vec<&str>, HashMap<String, String>) {
             let known = gradients.iter().find(|(name, _)| rest.contains(&format!("\"#{name}\"")));
             let whole = known.map_or(rest.to_owned(), |(name, text)| rest.replace(&format!("#{name}"), text));
             gradients.insert(id.to_owned(), whole);
-        } else if ["<g display", "<g><animate", "</g>"].iter().any(|start| line.starts_with(start)) {
-            elements.push(line);
-        } else if line.starts_with("<path") || line.starts_with("<line ") || line.starts_with("<circle") {
+        } else if ["<g display", "<g><animate", "</g>", "<path", "<line ", "<circle"]
+            .iter()
+            .any(|start| line.starts_with(start))
+        {
             elements.push(line);
         }
     }
@@ -62,11 +63,9 @@ fn numbers(value: &str) -> (Vec<f64>, String) {
     };
     let mut number = String::new();
     for c in value.chars().chain([' ']) {
-        if c == '-' || !(c.is_ascii_digit() || c == '.') {
-            if !number.is_empty() {
-                all.push(number.parse().expect("a number"));
-                number.clear();
-            }
+        if !number.is_empty() && !(c.is_ascii_digit() || c == '.') {
+            all.push(number.parse().expect("a number"));
+            number.clear();
         }
         match c {
             '-' | '.' | '0'..='9' => number.push(c),
