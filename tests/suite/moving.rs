@@ -63,7 +63,7 @@ fn numbers(value: &str) -> (Vec<f64>, String) {
     };
     let mut number = String::new();
     for c in value.chars().chain([' ']) {
-        if !number.is_empty() && !(c.is_ascii_digit() || c == '.') {
+        if !(number.is_empty() || c.is_ascii_digit() || c == '.') {
             all.push(number.parse().expect("a number"));
             number.clear();
         }
