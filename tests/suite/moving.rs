@@ -64,7 +64,11 @@ fn numbers(value: &str) -> (Vec<f64>, String) {
     let mut number = String::new();
     for c in value.chars().chain([' ']) {
         if !(number.is_empty() || c.is_ascii_digit() || c == '.') {
-            all.push(number.parse().expect("a number"));
+            // As in `stop-color`.
+            match number.as_str() {
+                "-" => rest.push('-'),
+                digits => all.push(digits.parse().expect("a number")),
+            }
             number.clear();
         }
         match c {
@@ -145,6 +149,11 @@ fn an_animated_svg_shows_each_frame() {
         let said = render("asvg", &at("a.svg"));
         assert!(said.contains(&format!("{count} frames")), "{said}");
         let film = fs::read_to_string(at("a.svg")).expect("a file");
+        let (root, _) = film.split_once("\n").expect("a line");
+        let root: HashMap<String, String> = attributes(root).into_iter().collect();
+        let length = |name: &str| numbers(&root[name]).0;
+        // Scene units in a pixel.
+        let pixel = length("viewBox")[2] / length("width")[0];
         for frame in 0..count {
             let file = fs::read_to_string(folder.path().join(format!("frames/frame-{frame:04}.svg")))
                 .expect("a file");
@@ -163,7 +172,7 @@ fn an_animated_svg_shows_each_frame() {
                         "{model}, frame {frame}"
                     );
                     // A colour may be off by a step and a half, a place by a twentieth of a pixel.
-                    let slack = if name == "fill" || name == "stroke" { 2.0 } else { 0.06 };
+                    let slack = if name == "fill" || name == "stroke" { 2.0 } else { 0.06 * pixel };
                     assert!(
                         a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= slack),
                         "{model}, frame {frame}: {a:?}, not {b:?}"

@@ -496,7 +496,9 @@ fn explain(error: render::Error, frame: &Frame, scene: &Scene) -> Failure {
 fn out_of_directory(error: render::Error) -> Failure {
     let message = format!("error: {error}\n");
     match error {
-        render::Error::Io { .. } | render::Error::TooLarge { .. } => Failure::Model(message),
+        render::Error::Io { .. } | render::Error::TooLarge { .. } | render::Error::AnotherView { .. } => {
+            Failure::Model(message)
+        }
         // The directory was chosen on the command line.
         _ => Failure::Usage(message),
     }

@@ -47,6 +47,8 @@ pub struct State {
     pub waits: bool,
     /// Number of the instant at which its trajectories last began.
     pub restarted: u64,
+    /// Number of the instant at which it last got other neighbours, without anything else that changed.
+    pub exchanged: u64,
 }
 
 /// A step, or a window of formulas, of one module.
@@ -147,6 +149,7 @@ impl State {
             open: None,
             waits: false,
             restarted: 0,
+            exchanged: 0,
         }
     }
 

@@ -112,7 +112,8 @@ impl FlowStage<'_, '_> {
             let Some(state) = self.world.state(id) else { continue };
             let coupled = self.is_coupled(id);
             let reads = state.rule.is_some_and(|r| self.setup.model.rules[r].reads_context);
-            let new_input = reads && state.context.iter().any(moved);
+            let new_input =
+                reads && (state.exchanged == self.instant.number || state.context.iter().any(moved));
             if coupled {
                 if !state.coupled {
                     affected.joined.push(id);
