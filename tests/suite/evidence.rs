@@ -200,3 +200,27 @@ fn sides_that_stay_within_the_error_get_a_warning_and_a_crossing_gets_none() {
         assert_eq!(remarks(&sine(0.0), method, 4.0), Vec::<String>::new());
     }
 }
+
+#[test]
+fn a_module_goes_on_with_the_neighbour_that_comes_when_another_dies() {
+    // x' = r - x, first with r = 0.9 + t; from 0.1 on with r = 0.3 + t, of a module that nobody has read before.
+    let exact = |t: f64| {
+        let first = |t: f64| 0.7 * (-t).exp() - 0.1 + t;
+        let second = |t: f64| (first(0.1) + 0.6) * (0.1 - t).exp() - 0.7 + t;
+        if t <= 0.1 { first(t) } else { second(t) }
+    };
+    for growth in ["1", "1 + 0*y*sin(t)"] {
+        let text = format!(
+            "initial string: A(0.6) B(0.9) B(0.3)\nA(x) > B(r): solve dx/dt = r - x\nA(x): solve dx/dt = -x\n\
+             B(y):\n if y < 1 solve dy/dt = {growth}\n if y >= 1 produce ε\n"
+        );
+        for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau] {
+            let settings = Settings { method, tolerance: 1e-8, ..Settings::default() };
+            let times = [0.05, 0.2, 0.6];
+            for (t, string) in times.into_iter().zip(run(&text, settings, &times).expect("it runs")) {
+                let x = string[0].1[0];
+                assert!((x - exact(t)).abs() < 1e-7, "{method:?}, {growth}, {t}: {x}, not {}", exact(t));
+            }
+        }
+    }
+}

@@ -156,9 +156,55 @@ fn pulses(dice: &mut Dice) -> String {
     )
 }
 
+/// Cells between cells with lives of their own, which are replaced and die, so that others become neighbours.
+fn turnover(dice: &mut Dice) -> String {
+    let mut string = String::new();
+    for _ in 0..2 + dice.below(6) {
+        string += &format!(" A({}, 0)", dice.rounded(0.1, 1.2));
+        if dice.below(3) > 0 {
+            string += &format!(" B({}, {})", dice.rounded(0.0, 0.5), dice.below(4));
+        }
+    }
+    let react = reaction(dice);
+    let (p, q, r) = (size(dice, 0.4), size(dice, 0.4), dice.rounded(0.3, 2.0));
+    let born = dice.rounded(0.0, 0.5);
+    let life = match dice.below(4) {
+        0 => format!("{r}"),
+        1 => format!("{r}*exp(-y)"),
+        2 => "1 - y/3".to_owned(),
+        _ => format!("{r} + 0.3*sin(t)"),
+    };
+    let last = match dice.below(3) {
+        0 => "ε".to_owned(),
+        1 => format!("A({born}, 1)"),
+        _ => "D(y)".to_owned(),
+    };
+    let read = match dice.below(3) {
+        0 => "x",
+        1 => "x^2",
+        _ => "max(x, 0.4)",
+    };
+    let death = match dice.below(3) {
+        0 => format!("\n  if n = 0 & age = {} produce ε", dice.rounded(0.3, 3.0)),
+        1 => format!("\n  if n = 0 & age = {} produce A(x/2, 1) B(0, 2)", dice.rounded(0.3, 3.0)),
+        _ => String::new(),
+    };
+    format!(
+        "initial string:{string}\n\
+         B(l, m) < A(x, n) > B(r, o): solve dx/dt = {p}*l + {q}*r - {p}*x{react}{death}\n\
+         B(l, m) < A(x, n): solve dx/dt = {p}*(l - {read}){react}{death}\n\
+         A(x, n) > B(r, o): solve dx/dt = {q}*(r - {read}){react}{death}\n\
+         A(l, m) < A(x, n) > A(r, o): solve dx/dt = {p}*(l + r - 2x){react}{death}\n\
+         A(l, m) < A(x, n): solve dx/dt = {p}*(l - x){react}{death}\n\
+         A(x, n): solve dx/dt = -x{death}\n\
+         B(y, k):\n  if y < 1 solve dy/dt = {life}\n  if y >= 1 & k > 0 produce B({born}, k - 1)\n  if y >= 1 & k <= 0 produce {last}\n"
+    )
+}
+
 fn model(seed: u64) -> String {
     let mut dice = Dice(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
-    match dice.below(10) {
+    match dice.below(13) {
+        10.. => turnover(&mut dice),
         0..=5 => filament(&mut dice),
         6 => tree(&mut dice),
         7 | 8 => values(&mut dice),

@@ -118,13 +118,14 @@ impl EventStage<'_, '_> {
             .retain(|id| world.state(*id).is_some_and(|s| s.rule.is_some()) || world.is_lazy(*id));
     }
 
-    /// Gives a module that goes on as it was the neighbours that have come in the place of others. The common step begins
-    /// anew for it: a neighbour with a predicted life begins no trajectory that would tell.
+    /// Gives a module that goes on as it was the neighbours that have come in the place of others. It is integrated anew,
+    /// and each of them is examined, whether it begins a trajectory now or has been there before: it may have to join.
     fn exchange_neighbours(&mut self, id: ModuleId, context: &Context) {
         let state = self.world.state_mut(id).expect("a module that goes on");
         let left = state.context.iter().filter(|seen| !context.contains(seen));
         self.flows.coupled.loosened.extend(left);
         self.flows.coupled.loosened.push(id);
+        self.flows.coupled.loosened.extend_from_slice(context);
         state.exchanged = self.instant.number;
         state.context.clone_from(context);
     }
