@@ -60,6 +60,7 @@ mod motion;
 mod obstacles;
 mod pairs;
 mod settings;
+mod soil;
 mod step;
 pub mod study;
 
@@ -72,6 +73,7 @@ pub use ground::Ground;
 pub use motion::Motion;
 pub use obstacles::{Obstacle, Obstacles, Open, Span, Surface};
 pub use settings::Settings;
+pub use soil::{Columns, Soil};
 
 /// A vector of three components.
 pub type Vector = nalgebra::Vector3<f64>;
