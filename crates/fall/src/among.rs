@@ -83,7 +83,10 @@ impl Rules {
     fn stay(&self, span: &Span, state: &State) -> Option<(Step, State)> {
         let near = span.near(self.ball(&state.motion, 0.0), &state.ignored);
         let print = print(span, &near);
-        if near.iter().any(|index| !span.swept(*index).is_still) || print != state.support || !self.is_held(state) {
+        if near.iter().any(|index| !span.swept(*index).is_still)
+            || print != state.support
+            || !self.is_held(state)
+        {
             return None;
         }
         let support = if span.is_last() { FINAL } else { print };

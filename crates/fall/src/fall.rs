@@ -144,12 +144,14 @@ impl Fall {
         let (size, moment) = (body.size(), dynamics.moment());
         let hull = [f64::min, f64::max].map(|most: fn(f64, f64) -> f64| {
             let sign = most(-1.0, 1.0);
-            let ends = parts.iter().flat_map(|part| part.core().iter().map(move |point| (point, part.radius())));
+            let ends =
+                parts.iter().flat_map(|part| part.core().iter().map(move |point| (point, part.radius())));
             let ends = ends.map(|(point, radius)| point.add_scalar(sign * radius));
             ends.reduce(|a, b| a.zip_map(&b, most)).unwrap_or_default()
         });
         let (soil, close, hilly, room) = (None, None, false, f64::INFINITY);
-        let rules = Rules { size, moment, body, parts, dynamics, ground, settings, hull, soil, close, hilly, room };
+        let rules =
+            Rules { size, moment, body, parts, dynamics, ground, settings, hull, soil, close, hilly, room };
         let state = State {
             time,
             motion,

@@ -6,7 +6,7 @@
 //!
 //! - [`Body`]: a plate or a lump, with its mass, its size and the points by which it touches the ground.
 //! - [`Motion`]: position, attitude, and their rates, at an instant.
-//! - [`Wind`]: gives the velocity of the air; [`Ground`]: a level floor with friction and restitution.
+//! - [`Wind`]: gives the velocity of the air; [`Ground`]: a level floor with friction and restitution; [`Soil`]: a height field.
 //! - [`Fall`]: the motion of a body after its release, at any time in any order.
 //! - [`study`]: exact cases with their errors and orders.
 //!

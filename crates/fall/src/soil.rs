@@ -188,8 +188,10 @@ impl Relief {
 
     /// True if no column below what lies in it has got lower.
     fn holds(&self, hollow: &Hollow) -> bool {
-        let columns = (hollow.z[0]..=hollow.z[1]).flat_map(|k| (hollow.x[0]..=hollow.x[1]).map(move |i| (i, k)));
-        hollow.is_empty() || columns.zip(&hollow.heights).all(|((i, k), held)| self.soil.columns.height(i, k) >= *held)
+        let columns =
+            (hollow.z[0]..=hollow.z[1]).flat_map(|k| (hollow.x[0]..=hollow.x[1]).map(move |i| (i, k)));
+        hollow.is_empty()
+            || columns.zip(&hollow.heights).all(|((i, k), held)| self.soil.columns.height(i, k) >= *held)
     }
 
     /// The triangles of the square from a column on, counterclockwise from above.
@@ -261,7 +263,8 @@ impl Relief {
                 for face in self.square(i, k) {
                     let [a, b, c] = &face.corners;
                     let middle = (a + b + c) / 3.0;
-                    let reach = face.corners.iter().map(|corner| (corner - middle).norm()).fold(0.0, f64::max);
+                    let reach =
+                        face.corners.iter().map(|corner| (corner - middle).norm()).fold(0.0, f64::max);
                     let local = motion.attitude.inverse_transform_vector(&(middle - motion.position));
                     let [low, high] = &rules.hull;
                     let outside = (0..3).map(|n| (low[n] - local[n]).max(local[n] - high[n]).max(0.0));
@@ -281,7 +284,8 @@ impl Relief {
         let small = 1e-9 * rules.size;
         let mut push = |facing: Facing| {
             let known = |other: &Facing| {
-                (other.arm - facing.arm).norm() <= 1e-6 * rules.size && other.normal.dot(&facing.normal) > 1.0 - TILT
+                (other.arm - facing.arm).norm() <= 1e-6 * rules.size
+                    && other.normal.dot(&facing.normal) > 1.0 - TILT
             };
             if facing.gap <= margin && !found.iter().any(known) {
                 found.push(facing);
@@ -301,7 +305,8 @@ impl Relief {
                     push(facing(point, face.up, -face.depth(point) - width));
                     continue;
                 }
-                for face in self.faces([point.x - reach, point.x + reach], [point.z - reach, point.z + reach]) {
+                for face in self.faces([point.x - reach, point.x + reach], [point.z - reach, point.z + reach])
+                {
                     let above = -face.depth(point);
                     if above > reach || above <= 0.0 {
                         continue;
@@ -377,8 +382,10 @@ impl Relief {
                     Touch::Nothing => step.end,
                     Touch::At(time) | Touch::Until(time) => time,
                 };
-                let place = |_: f64| Front { points: face.corners.to_vec(), velocities: vec![Vector::zeros(); 3] };
-                let found = rules.pass_by(step, part, (rules.width(part), &place), (bend, until), (depth, sunk));
+                let place =
+                    |_: f64| Front { points: face.corners.to_vec(), velocities: vec![Vector::zeros(); 3] };
+                let found =
+                    rules.pass_by(step, part, (rules.width(part), &place), (bend, until), (depth, sunk));
                 if found != Touch::Nothing {
                     first = found;
                 }
@@ -452,7 +459,8 @@ impl Rules {
             state.hollow = Arc::new(self.pit(&relief, motion));
         }
         if !state.hollow.is_empty() && state.phase != Phase::Rest {
-            let covered = relief.facings(self, motion, 0.0).iter().any(|facing| facing.gap < -self.resolution());
+            let covered =
+                relief.facings(self, motion, 0.0).iter().any(|facing| facing.gap < -self.resolution());
             if !covered {
                 state.hollow = Arc::default();
             }
@@ -482,7 +490,8 @@ impl Rules {
         // What lies on soil may be in it by rounding.
         let (enough, mut sunk) = (-(SKIN + 1.0) * self.resolution(), 0.0);
         for _ in 0..MOVES {
-            let lower = Relief { near: relief.hollow(columns, sunk), hollow: Arc::default(), ..relief.clone() };
+            let lower =
+                Relief { near: relief.hollow(columns, sunk), hollow: Arc::default(), ..relief.clone() };
             let facings = lower.facings(self, motion, 0.0);
             let Some(deepest) = facings.iter().min_by(|a, b| a.gap.total_cmp(&b.gap)) else { break };
             if deepest.gap >= enough {
@@ -502,7 +511,11 @@ impl Rules {
                 // Beyond the room, soil is not known to be level.
                 let swept = step.swept(self.body.reach());
                 let part = 0.5 * self.room / swept;
-                if swept > self.room { Touch::Until(step.start + (step.end - step.start) * part) } else { Touch::Nothing }
+                if swept > self.room {
+                    Touch::Until(step.start + (step.end - step.start) * part)
+                } else {
+                    Touch::Nothing
+                }
             }
         }
     }
@@ -534,7 +547,11 @@ fn sunk(core: &[Vector], face: &Face, size: f64) -> f64 {
         }
         let middle = (inside + outside) / 2.0;
         let moved: Vec<Vector> = core.iter().map(|point| point + face.up * middle).collect();
-        if Meeting::of(&moved, &face.corners).way.norm() > 1e-9 * size { outside = middle } else { inside = middle }
+        if Meeting::of(&moved, &face.corners).way.norm() > 1e-9 * size {
+            outside = middle
+        } else {
+            inside = middle
+        }
     }
     outside
 }

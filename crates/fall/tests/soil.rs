@@ -30,7 +30,9 @@ impl Columns for Heights {
 
     fn bounds(&self, x: [i32; 2], z: [i32; 2]) -> [f64; 2] {
         let all = (x[0]..=x[1]).flat_map(|i| (z[0]..=z[1]).map(move |k| self.height(i, k)));
-        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], height| [low.min(height), high.max(height)])
+        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], height| {
+            [low.min(height), high.max(height)]
+        })
     }
 }
 
@@ -91,7 +93,11 @@ fn what_lies_on_soil_is_covered_and_falls_when_it_is_dug_away() -> Result<(), Er
         assert_eq!(fall.among(time, &Still, &soil)?, lies, "{time}");
     }
     let dug = fall.among(9.0, &Still, &soil)?;
-    assert!(height(&dug, 0.1).abs() < 1e-3 && dug.velocity == Vector::zeros(), "{dug:?} {}", height(&dug, 0.1));
+    assert!(
+        height(&dug, 0.1).abs() < 1e-3 && dug.velocity == Vector::zeros(),
+        "{dug:?} {}",
+        height(&dug, 0.1)
+    );
     assert_eq!(fall.among(3.9, &Still, &soil)?, lies);
     Ok(())
 }

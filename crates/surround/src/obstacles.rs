@@ -218,4 +218,3 @@ impl Run<'_> {
         Ok(Tick { span: Arc::new(span), failed })
     }
 }
-

@@ -171,7 +171,8 @@ impl<'m> Weather<'m> {
             Some(eddy) if size > NOTHING * eddy => Declared::new(scenery, self.declared.spans.wind, size)?,
             _ => Arc::clone(&self.declared),
         };
-        let (solids, obstacles, footing) = (self.solids.clone(), self.obstacles.clone(), self.footing.clone());
+        let (solids, obstacles, footing) =
+            (self.solids.clone(), self.obstacles.clone(), self.footing.clone());
         Ok(Weather { declared, solids, obstacles, footing, recent: Recent::default() })
     }
 

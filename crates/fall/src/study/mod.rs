@@ -16,8 +16,8 @@ pub use contact::{bounce_on_plate, carry, moving_plate, parabola, slope};
 pub use flight::{broadside, broadside_steps, flutter, terminal_speed, tumble};
 pub use landing::{RandomLanding, bounce, contact_energy, random_landing, roll, slide, slide_in_air};
 pub use passes::{RandomContact, random_contact};
-pub use soil::{RandomHills, random_hills, roll_on_soil, slope_of_soil};
 pub use planar::{Planar, planar_flutter, planar_tumble};
+pub use soil::{RandomHills, random_hills, roll_on_soil, slope_of_soil};
 
 /// A case: computes its rows.
 pub type Case = fn() -> Result<Vec<Convergence>, Error>;

@@ -37,7 +37,9 @@ impl<F: Fn(f64, f64) -> f64 + Send + Sync> Columns for Hills<F> {
 
     fn bounds(&self, x: [i32; 2], z: [i32; 2]) -> [f64; 2] {
         let all = (x[0]..=x[1]).flat_map(|i| (z[0]..=z[1]).map(move |k| self.height(i, k)));
-        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], height| [low.min(height), high.max(height)])
+        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], height| {
+            [low.min(height), high.max(height)]
+        })
     }
 }
 
