@@ -166,17 +166,22 @@ fn plants_let_go_in_the_scene() {
     let folder = tempfile::tempdir().expect("a folder");
     let flower = "initial string: f(0.5) [ P ]\nP: if age = 1 produce @D Q\ninterpret P: @P(0.1)\ninterpret Q: @P(0.1)\n";
     let scene = "plant @Flower from \"flower.dls\"\nground -0.3\ninitial string: f(0.4) +(90) @Flower(-5)\n";
-    for (name, text) in [("flower.dls", flower), ("scene.dls", scene)] {
+    // Soil is a ground, too: level, and with a slope that begins elsewhere.
+    let soil = "soil dry = sand\nground dry cell 0.02 depth 1 height -0.3 + max(0, 0.2*(x - 1)) extent 2";
+    let on_soil = scene.replace("ground -0.3", soil);
+    for (name, text) in [("flower.dls", flower), ("scene.dls", scene), ("soil.dls", &on_soil)] {
         std::fs::write(folder.path().join(name), text).expect("written");
     }
-    let session =
-        Session::open(&folder.path().join("scene.dls"), &[]).unwrap_or_else(|refused| panic!("{refused}"));
-    let scene = scenes(&session, &[3.0]).remove(0);
-    let flat = scene.flattened();
-    let surface = &flat.surfaces[0];
-    let bottom =
-        surface.mesh.vertices.iter().map(|p| surface.placement.point(*p).y).fold(f64::INFINITY, f64::min);
-    assert!((bottom + 0.3).abs() < 3e-4, "{bottom}");
+    for name in ["scene.dls", "soil.dls"] {
+        let session =
+            Session::open(&folder.path().join(name), &[]).unwrap_or_else(|refused| panic!("{refused}"));
+        let scene = scenes(&session, &[3.0]).remove(0);
+        let flat = scene.flattened();
+        let surface = &flat.surfaces[0];
+        let bottom =
+            surface.mesh.vertices.iter().map(|p| surface.placement.point(*p).y).fold(f64::INFINITY, f64::min);
+        assert!((bottom + 0.3).abs() < 3e-4, "{name}: {bottom}");
+    }
 }
 
 /// A twig keeps the bend with which it was let go.

@@ -6,8 +6,9 @@ use std::sync::Arc;
 use crate::error::check;
 use crate::forces::Dynamics;
 use crate::motion::Packed;
-use crate::soil::{Close, Hollow, Relief};
+use crate::soil::{Hollow, Relief};
 use crate::step::{Step, bogacki_shampine};
+use crate::underlay::Close;
 use crate::{Body, Error, Ground, Motion, Obstacles, Open, Settings, Vector, Wind};
 
 /// What a body is doing.

@@ -63,6 +63,7 @@ mod settings;
 mod soil;
 mod step;
 pub mod study;
+mod underlay;
 
 pub use air::Air;
 pub use body::{Body, Contact, Shape};
