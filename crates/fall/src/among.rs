@@ -191,9 +191,9 @@ impl Rules {
         let mut level = self.contact_level(&relative).max(1);
         let most = (level + FINER).min(self.settings.deepest);
         // What is carried along goes on in steps as long as those of what carries it.
-        let mut end =
-            if state.calm > self.topple() { span.end() } else { self.grid(time, level).min(span.end()) };
-        let mut is_long = state.calm > self.topple();
+        // A long step would come near to much soil.
+        let mut is_long = state.calm > self.topple() && !self.hilly;
+        let mut end = if is_long { span.end() } else { self.grid(time, level).min(span.end()) };
         loop {
             let h = end - time;
             let slide = match self.slid(&scene, state, (end, carrier), wind)? {

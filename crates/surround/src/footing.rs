@@ -38,7 +38,7 @@ pub(crate) struct Footing<'m> {
 }
 
 /// The number of a tick, and the bits of the beginning of the span of solids in it.
-type Key = (u64, u64);
+type Key = (i64, u64);
 
 /// Columns at a tick.
 #[derive(Debug)]
@@ -102,7 +102,7 @@ impl<'m> Footing<'m> {
         }
         let terrain = self.terrain.get_or_init(|| Terrain::new(self.model, self.settings, 1));
         let found = match terrain {
-            Ok(Some(terrain)) => terrain.columns(number),
+            Ok(Some(terrain)) => terrain.columns(number.max(0) as u64),
             Ok(None) => return Ok(solids),
             Err(error) => Err(error.clone()),
         };
@@ -136,14 +136,14 @@ impl<'m> Footing<'m> {
     }
 }
 
-/// The number of the tick in which a time in s lies, as its beginning or after it.
-fn tick_of(time: f64) -> u64 {
-    let number = (time.max(0.0) * TICKS).floor();
+/// The number of the tick in which a time in s lies, as its beginning or after it. Before the first one the soil is that at the beginning.
+fn tick_of(time: f64) -> i64 {
+    let number = (time * TICKS).floor();
     // Saturates.
-    let number = number as u64;
+    let number = number as i64;
     match () {
         () if (number + 1) as f64 / TICKS <= time => number + 1,
-        () if number as f64 / TICKS > time => number.saturating_sub(1),
+        () if number as f64 / TICKS > time => number - 1,
         () => number,
     }
 }
@@ -178,10 +178,10 @@ mod tests {
 
     #[test]
     fn a_time_lies_in_its_tick() {
-        for number in 0..100_000_u64 {
+        for number in -1000..100_000_i64 {
             let begin = number as f64 / TICKS;
             assert_eq!(tick_of(begin), number);
-            assert_eq!(tick_of(begin.next_down()), number.saturating_sub(1));
+            assert_eq!(tick_of(begin.next_down()), number - 1);
         }
     }
 }
