@@ -166,17 +166,22 @@ fn plants_let_go_in_the_scene() {
     let folder = tempfile::tempdir().expect("a folder");
     let flower = "initial string: f(0.5) [ P ]\nP: if age = 1 produce @D Q\ninterpret P: @P(0.1)\ninterpret Q: @P(0.1)\n";
     let scene = "plant @Flower from \"flower.dls\"\nground -0.3\ninitial string: f(0.4) +(90) @Flower(-5)\n";
-    for (name, text) in [("flower.dls", flower), ("scene.dls", scene)] {
+    // Soil is a ground, too: level, and with a slope that begins elsewhere.
+    let soil = "soil dry = sand\nground dry cell 0.02 depth 1 height -0.3 + max(0, 0.2*(x - 1)) extent 2";
+    let on_soil = scene.replace("ground -0.3", soil);
+    for (name, text) in [("flower.dls", flower), ("scene.dls", scene), ("soil.dls", &on_soil)] {
         std::fs::write(folder.path().join(name), text).expect("written");
     }
-    let session =
-        Session::open(&folder.path().join("scene.dls"), &[]).unwrap_or_else(|refused| panic!("{refused}"));
-    let scene = scenes(&session, &[3.0]).remove(0);
-    let flat = scene.flattened();
-    let surface = &flat.surfaces[0];
-    let bottom =
-        surface.mesh.vertices.iter().map(|p| surface.placement.point(*p).y).fold(f64::INFINITY, f64::min);
-    assert!((bottom + 0.3).abs() < 3e-4, "{bottom}");
+    for name in ["scene.dls", "soil.dls"] {
+        let session =
+            Session::open(&folder.path().join(name), &[]).unwrap_or_else(|refused| panic!("{refused}"));
+        let scene = scenes(&session, &[3.0]).remove(0);
+        let flat = scene.flattened();
+        let surface = &flat.surfaces[0];
+        let bottom =
+            surface.mesh.vertices.iter().map(|p| surface.placement.point(*p).y).fold(f64::INFINITY, f64::min);
+        assert!((bottom + 0.3).abs() < 3e-4, "{name}: {bottom}");
+    }
 }
 
 /// A twig keeps the bend with which it was let go.
@@ -286,6 +291,66 @@ fn a_fruit_falls_out_of_its_own_tree() {
     let at = |scenes: &[Scene], k: usize| surface(&scenes[k]).0;
     assert!((at(&free, 0) - at(&among, 0)).norm() < 1e-3, "{} {}", at(&free, 0), at(&among, 0));
     assert!((at(&among, 1).y - 0.04).abs() < 1e-3, "{}", at(&among, 1));
+}
+
+/// Sand is poured for a second; leaves and a ball are let go above the heap at t = 1.5. From t = 4 on a board moves through the heap, and from t = 6 on more is poured.
+const HEAP: &str = "soil dry = sand, repose 30\nground dry cell 0.01 depth 0.3 extent 0.5\nsolid Board\n\
+    pour dry rate if t < 1 then 0.003 else if t > 6 & t < 7 then 0.002 else 0 at 0, 1, 0 radius 0.02\n\
+    initial string: Board(0.4) [ f(0.3) for k in 0 .. 2: ( [ /(120*k) &(90) f(0.08) /(30) P(k) ] ) B ]\n\
+    P(k): if age = 1.5 produce @D Q(k)\nB: if age = 1.5 produce @D C\n\
+    interpret P(k): @P(0.05, 0.04)\ninterpret Q(k): @P(0.05, 0.04)\ninterpret B: -(90) f(0.02) @O(0.03)\ninterpret C: -(90) f(0.02) @O(0.03)\n\
+    Board(x): if t < 4 solve dx/dt = 0 if t >= 4 & t < 6 solve dx/dt = -0.3 if t >= 6 solve dx/dt = 0\n\
+    interpret Board(x): [ f(0.02) -(90) f(x) &(90) f(-0.15) !(0.06) F(0.3) ]\n";
+
+/// How high above the soil the places of what falls are: where leaves begin, and the middle of the ball.
+fn above(session: &Session, scene: &Scene, time: f64) -> Vec<f64> {
+    let made = dlsys::surround::Terrain::new(&session.model, Settings::default(), 1);
+    let terrain = made.unwrap_or_else(|error| panic!("{error}")).expect("soil");
+    let height =
+        |x: f64, z: f64| terrain.height(time, [x, z], None).unwrap_or_else(|error| panic!("{error}"));
+    let falls = scene.surfaces.iter().map(|surface| surface.placement.origin);
+    // The last surface is the soil itself.
+    falls.take(4).map(|at| at.y - height(at.x, at.z)).collect()
+}
+
+#[test]
+fn what_falls_lies_on_a_heap_and_is_moved_with_it() {
+    let session = read(HEAP);
+    let times = [3.0, 6.0, 7.5];
+    let scenes = self::scenes(&session, &times);
+    let on = above(&session, &scenes[0], times[0]);
+    assert!(on[..3].iter().all(|gap| *gap > -1e-4 && *gap < 0.01), "leaves lie on the heap: {on:?}");
+    assert!((on[3] - 0.015).abs() < 1e-3, "the ball has rolled down: {on:?}");
+    let ball = |scene: &Scene| scene.surfaces[3].placement.origin;
+    assert!(ball(&scenes[0]).x > 0.2 && ball(&scenes[0]).z.abs() < 0.02, "{}", ball(&scenes[0]));
+    for (scene, time) in scenes.iter().zip(times) {
+        let gaps = above(&session, scene, time);
+        assert!(gaps[..3].iter().all(|gap| *gap > -1e-3), "none is below the soil at {time}: {gaps:?}");
+    }
+    assert!(ball(&scenes[1]).x < 0.2, "the board has taken it along: {}", ball(&scenes[1]));
+}
+
+#[test]
+fn the_order_of_frames_and_threads_do_not_matter_on_soil() {
+    let session = read(HEAP);
+    let times: Vec<f64> = (0..20).map(|i| 1.4 + f64::from(i) * 0.161).collect();
+    let straight = scenes(&session, &times);
+    assert!(places(&straight[19]) != places(&straight[12]), "they move in the end");
+    let nursery = Nursery::new(&session.model, Settings::default());
+    let strings: Vec<ModuleString> = times.iter().map(|t| string(&session, *t)).collect();
+    std::thread::scope(|scope| {
+        for first in 0..2 {
+            let (nursery, strings, straight) = (&nursery, &strings, &straight);
+            scope.spawn(move || {
+                for i in (first..strings.len()).step_by(2).map(|i| i * 7 % strings.len()) {
+                    assert_eq!(places(&draw(nursery, &strings[i])), places(&straight[i]), "{i}");
+                }
+            });
+        }
+    });
+    for i in [9, 19] {
+        assert_eq!(places(&scenes(&session, &times[i..=i])[0]), places(&straight[i]), "{}", times[i]);
+    }
 }
 
 /// A solid that sheets push is where they have pushed it: a ball that drops into a cloth stays above it, and a petal that drops later lies on the ball.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::approach::Touch;
 use crate::contact::REBOUNDS;
-use crate::fall::{Phase, Rules, State};
+use crate::fall::{FINAL, Phase, Rules, State};
 
 use crate::impulse::{Bound, Carrier, collide};
 use crate::pairs::{Facing, SKIN, Scene};
@@ -82,11 +82,16 @@ impl Rules {
     /// A step at rest to the end of the span; `None` if something near moves, or is not what it was.
     fn stay(&self, span: &Span, state: &State) -> Option<(Step, State)> {
         let near = span.near(self.ball(&state.motion, 0.0), &state.ignored);
-        if near.iter().any(|index| !span.swept(*index).is_still) || print(span, &near) != state.support {
+        let print = print(span, &near);
+        if near.iter().any(|index| !span.swept(*index).is_still)
+            || print != state.support
+            || !self.is_held(state)
+        {
             return None;
         }
+        let support = if span.is_last() { FINAL } else { print };
         let step = Step::new(state.time, state.motion, span.end(), state.motion);
-        Some((step, State { time: span.end(), ..state.clone() }))
+        Some((step, State { time: span.end(), support, ..state.clone() }))
     }
 
     /// The solids that a body may come to in a step.
@@ -95,12 +100,23 @@ impl Rules {
         span.near(self.ball(&step.first, way), ignored)
     }
 
+    /// What the body meets first in a step: a solid, or soil that is not level.
+    fn first_met(&self, step: &Step, (span, near): (&Span, &[usize]), (depth, sunk): (f64, bool)) -> Touch {
+        let solid = self.first_touch(step, (span, near), (depth, sunk));
+        let soil = self.first_soil(step, (depth, sunk));
+        let time = |touch| match touch {
+            Touch::Nothing => f64::INFINITY,
+            Touch::At(time) | Touch::Until(time) => time,
+        };
+        if time(soil) < time(solid) { soil } else { solid }
+    }
+
     /// A step in flight, up to the next impact at most.
     fn soar(&self, span: &Span, state: &State, wind: &impl Wind) -> Result<(Step, State), Error> {
         let (step, next) = self.free_step((state, span.end()), wind)?;
         let near = self.around(span, &step, &state.ignored);
         let ground = self.ground.and_then(|ground| ground.first_contact(&step, &self.body, self.depth()));
-        let solid = match self.first_touch(&step, (span, &near), (self.depth(), false)) {
+        let solid = match self.first_met(&step, (span, &near), (self.depth(), false)) {
             // No further than rounding allows.
             Touch::Until(time) if time - step.start <= 1e-6 * (step.end - step.start) => Touch::At(time),
             touch => touch,
@@ -163,7 +179,7 @@ impl Rules {
         let gravity = self.settings.air.gravity;
         let fastest = motion.velocity.norm() + motion.spin.norm() * self.body.reach();
         let near = span.near(self.ball(&motion, (fastest + gravity * room) * room), &state.ignored);
-        if near.is_empty() {
+        if near.is_empty() && !self.hilly {
             return self.level_ground(span, state, wind);
         }
         let scene = Scene { rules: self, span, near: &near };
@@ -175,9 +191,9 @@ impl Rules {
         let mut level = self.contact_level(&relative).max(1);
         let most = (level + FINER).min(self.settings.deepest);
         // What is carried along goes on in steps as long as those of what carries it.
-        let mut end =
-            if state.calm > self.topple() { span.end() } else { self.grid(time, level).min(span.end()) };
-        let mut is_long = state.calm > self.topple();
+        // A long step would come near to much soil.
+        let mut is_long = state.calm > self.topple() && !self.hilly;
+        let mut end = if is_long { span.end() } else { self.grid(time, level).min(span.end()) };
         loop {
             let h = end - time;
             let slide = match self.slid(&scene, state, (end, carrier), wind)? {
@@ -195,7 +211,7 @@ impl Rules {
             };
             let passed = self.around(span, &slide.step, &state.ignored);
             let clear =
-                || self.first_touch(&slide.step, (span, &passed), (0.5 * resolution, true)) == Touch::Nothing;
+                || self.first_met(&slide.step, (span, &passed), (0.5 * resolution, true)) == Touch::Nothing;
             if is_long && slide.moved > CARRIED * resolution || level < most && !clear() {
                 if !is_long {
                     level += 1;
@@ -255,7 +271,7 @@ impl Rules {
             halted: false,
             ..state.clone()
         };
-        (step, next)
+        (step, self.bedded(next))
     }
 
     /// A step in contact with the ground alone.
@@ -265,7 +281,7 @@ impl Rules {
         };
         let (step, next) = self.slide(ground, (state, span.end()), wind)?;
         let beside = span.near(self.ball(&next.motion, 0.0), &state.ignored);
-        Ok((step, State { support: print(span, &beside), halted: false, ..next }))
+        Ok((step, self.bedded(State { support: print(span, &beside), halted: false, ..next })))
     }
 
     /// Tries a step in contact up to a time: acceleration, then the impulses by which nothing sinks into what it touches, then motion at the new velocity. The

@@ -26,9 +26,9 @@ pub(crate) enum Touch {
 }
 
 /// A part of a body, or of a solid, at an instant: places of the points of its core, and their velocities.
-struct Front {
-    points: Vec<Vector>,
-    velocities: Vec<Vector>,
+pub(crate) struct Front {
+    pub(crate) points: Vec<Vector>,
+    pub(crate) velocities: Vec<Vector>,
 }
 
 impl Front {
@@ -76,7 +76,8 @@ impl Rules {
                         let velocity = |point: &Vector| place.velocity_at(&(point - place.position));
                         Front { velocities: points.iter().map(velocity).collect(), points }
                     };
-                    let found = self.pass_by(step, part, (shape, &place), (bend, until), (depth, sunk));
+                    let width = self.distance(part, shape);
+                    let found = self.pass_by(step, part, (width, &place), (bend, until), (depth, sunk));
                     if found != Touch::Nothing {
                         first = found;
                     }
@@ -86,15 +87,15 @@ impl Rules {
         first
     }
 
-    fn pass_by(
+    /// When a part of the body first comes nearer than a width to points that move, up to a time.
+    pub(crate) fn pass_by(
         &self,
         step: &Step,
         part: &Shape,
-        (shape, other): (&Shape, &dyn Fn(f64) -> Front),
+        (mut width, other): (f64, &dyn Fn(f64) -> Front),
         (bend, until): (f64, f64),
         (depth, sunk): (f64, bool),
     ) -> Touch {
-        let mut width = self.distance(part, shape);
         let mut time = step.start;
         for instant in 0..INSTANTS {
             let own = Front::of_body(self, &step.at(time), part);

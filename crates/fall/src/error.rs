@@ -28,6 +28,14 @@ pub enum Error {
         /// Time in s.
         time: f64,
     },
+    /// The body lies on too many columns.
+    #[error("there are {count} columns of the ground below it, and may be {most}")]
+    Columns {
+        /// How many.
+        count: i64,
+        /// The most that are allowed.
+        most: i64,
+    },
     /// The error is too large even with the shortest step.
     #[error(
         "at {time:.6} s, steps of {step:.1e} s are not short enough: the error is {excess:.1e} times the tolerance"

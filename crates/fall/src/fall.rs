@@ -6,8 +6,10 @@ use std::sync::Arc;
 use crate::error::check;
 use crate::forces::Dynamics;
 use crate::motion::Packed;
+use crate::soil::{Hollow, Relief};
 use crate::step::{Step, bogacki_shampine};
-use crate::{Body, Error, Ground, Motion, Obstacles, Open, Settings, Wind};
+use crate::underlay::Close;
+use crate::{Body, Error, Ground, Motion, Obstacles, Open, Settings, Vector, Wind};
 
 /// What a body is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +38,8 @@ pub(crate) struct State {
     pub(crate) ignored: Arc<[u64]>,
     /// A print of the solids near a body that rests.
     pub(crate) support: u64,
+    /// Soil above these heights has come onto the body and does not push it.
+    pub(crate) hollow: Arc<Hollow>,
     /// The last step took no time.
     pub(crate) halted: bool,
 }
@@ -58,6 +62,13 @@ pub(crate) struct Rules {
     pub(crate) dynamics: Dynamics,
     pub(crate) ground: Option<Ground>,
     pub(crate) settings: Settings,
+    /// The box around the parts, in the axes of the body.
+    pub(crate) hull: [Vector; 2],
+    /// The soil below the body in the present step; whether the body may come to some that is not level, and how far it may get for that to hold, in m.
+    pub(crate) soil: Option<Relief>,
+    pub(crate) close: Option<Close>,
+    pub(crate) hilly: bool,
+    pub(crate) room: f64,
     /// Largest half-extent in m.
     pub(crate) size: f64,
     /// Time scale in s, see [`Dynamics::moment`].
@@ -132,7 +143,16 @@ impl Fall {
         let balls: Vec<_> = body.contacts.iter().map(|contact| (contact.point, contact.radius)).collect();
         let parts = if balls.is_empty() { Vec::new() } else { dlsys_solid::parts(&balls)? };
         let (size, moment) = (body.size(), dynamics.moment());
-        let rules = Rules { size, moment, body, parts, dynamics, ground, settings };
+        let hull = [f64::min, f64::max].map(|most: fn(f64, f64) -> f64| {
+            let sign = most(-1.0, 1.0);
+            let ends =
+                parts.iter().flat_map(|part| part.core().iter().map(move |point| (point, part.radius())));
+            let ends = ends.map(|(point, radius)| point.add_scalar(sign * radius));
+            ends.reduce(|a, b| a.zip_map(&b, most)).unwrap_or_default()
+        });
+        let (soil, close, hilly, room) = (None, None, false, f64::INFINITY);
+        let rules =
+            Rules { size, moment, body, parts, dynamics, ground, settings, hull, soil, close, hilly, room };
         let state = State {
             time,
             motion,
@@ -144,6 +164,7 @@ impl Fall {
             rate: None,
             ignored: Arc::from([]),
             support: 0,
+            hollow: Arc::default(),
             halted: false,
         };
         Ok(Fall {
@@ -253,7 +274,7 @@ impl Fall {
                 return Ok(self.state.motion);
             }
             let before = self.state.motion;
-            let (step, next) = self.rules.advance(&self.state, wind, obstacles)?;
+            let (step, next) = self.rules.advance(&mut self.state, wind, obstacles)?;
             self.note(step.start, &before, &step.first);
             self.note(step.end, &step.last, &next.motion);
             let (steps, reached) = (next.steps, next.time);
@@ -273,11 +294,11 @@ impl Fall {
         wind: &impl Wind,
         obstacles: &impl Obstacles,
     ) -> Result<Option<Part>, Error> {
-        let before = self.state.clone();
+        let mut before = self.state.clone();
         if before.phase == Phase::Rest || before.time >= until {
             return Ok(None);
         }
-        let (step, next) = self.rules.advance(&before, wind, obstacles)?;
+        let (step, next) = self.rules.advance(&mut before, wind, obstacles)?;
         let flight = before.phase == Phase::Flight;
         let part = Part { before: before.motion, within: step.last, after: next.motion, flight };
         (self.step, self.state) = (Some(step), next);
@@ -348,12 +369,14 @@ impl Rules {
 
     /// The next step, and the state after it.
     fn advance(
-        &self,
-        state: &State,
+        &mut self,
+        state: &mut State,
         wind: &impl Wind,
         obstacles: &impl Obstacles,
     ) -> Result<(Step, State), Error> {
-        let (step, mut next) = match (obstacles.span(state.time)?, state.phase, &self.ground) {
+        let span = obstacles.span(state.time)?;
+        self.underlay(state, span.as_deref())?;
+        let (step, mut next) = match (span, state.phase, &self.ground) {
             (Some(span), ..) => self.pass(&span, state, wind)?,
             (None, Phase::Contact, Some(ground)) => self.slide(ground, (state, f64::INFINITY), wind)?,
             (None, ..) => self.fly(state, wind)?,

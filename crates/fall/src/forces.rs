@@ -66,6 +66,11 @@ impl Dynamics {
         }
     }
 
+    /// Puts a floor below the body: air sticks to it.
+    pub(crate) fn stand_on(&mut self, ground: Ground) {
+        self.ground = Some(ground);
+    }
+
     /// Time in s in which the body falls its half chord.
     pub(crate) fn moment(&self) -> f64 {
         // A body without weight or without air has no terminal speed; gravity then sets the scale.

@@ -6,7 +6,7 @@
 //!
 //! - [`Body`]: a plate or a lump, with its mass, its size and the points by which it touches the ground.
 //! - [`Motion`]: position, attitude, and their rates, at an instant.
-//! - [`Wind`]: gives the velocity of the air; [`Ground`]: a level floor with friction and restitution.
+//! - [`Wind`]: gives the velocity of the air; [`Ground`]: a level floor with friction and restitution; [`Soil`]: a height field.
 //! - [`Fall`]: the motion of a body after its release, at any time in any order.
 //! - [`study`]: exact cases with their errors and orders.
 //!
@@ -60,8 +60,10 @@ mod motion;
 mod obstacles;
 mod pairs;
 mod settings;
+mod soil;
 mod step;
 pub mod study;
+mod underlay;
 
 pub use air::Air;
 pub use body::{Body, Contact, Shape};
@@ -72,6 +74,7 @@ pub use ground::Ground;
 pub use motion::Motion;
 pub use obstacles::{Obstacle, Obstacles, Open, Span, Surface};
 pub use settings::Settings;
+pub use soil::{Columns, Soil};
 
 /// A vector of three components.
 pub type Vector = nalgebra::Vector3<f64>;

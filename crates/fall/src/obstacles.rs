@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dlsys_solid::{Path, Shape};
 
 use crate::error::check;
-use crate::{Error, Vector};
+use crate::{Error, Soil, Vector};
 
 /// How a body that touches something is held.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +63,8 @@ pub struct Span {
     end: f64,
     solids: Vec<Obstacle>,
     swept: Vec<Swept>,
+    soil: Option<Soil>,
+    is_last: bool,
 }
 
 /// What a solid does in a span.
@@ -95,7 +97,33 @@ impl Span {
             let ball = (middle, reach + speed * (end - begin) / 2.0);
             swept.push(Swept { ball, acceleration, is_still: solid.path.is_still() });
         }
-        Ok(Span { begin, end, solids, swept })
+        Ok(Span { begin, end, solids, swept, soil: None, is_last: false })
+    }
+
+    /// With soil, which stands still from the beginning to the end. What has come to rest on it stays there, until the soil below it is lower in a later span; soil
+    /// that is higher covers it.
+    ///
+    /// # Errors
+    ///
+    /// Columns without distance, a surface out of range.
+    pub fn above(mut self, soil: Soil) -> Result<Span, Error> {
+        soil.check()?;
+        self.soil = Some(soil);
+        Ok(self)
+    }
+
+    /// The last span that differs: what rests in it rests for ever.
+    pub fn last(mut self) -> Span {
+        self.is_last = true;
+        self
+    }
+
+    pub(crate) fn soil(&self) -> Option<&Soil> {
+        self.soil.as_ref()
+    }
+
+    pub(crate) fn is_last(&self) -> bool {
+        self.is_last
     }
 
     /// When it begins, in s.

@@ -51,6 +51,11 @@ impl Rules {
         (own.radius() + other.radius()).max(SKIN * self.resolution())
     }
 
+    /// The distance of the core of a part from soil that it touches.
+    pub(crate) fn width(&self, own: &Shape) -> f64 {
+        own.radius().max(SKIN * self.resolution())
+    }
+
     /// A ball around the body, which is larger than it by a length.
     pub(crate) fn ball(&self, motion: &Motion, more: f64) -> (Vector, f64) {
         (motion.position, self.body.reach() + SKIN * self.resolution() + more)
@@ -65,7 +70,10 @@ impl Scene<'_> {
     /// How what is touched holds the body.
     pub(crate) fn surface(&self, number: usize) -> Surface {
         match number {
-            GROUND => self.rules.ground.map(|ground| ground.surface()).unwrap_or_default(),
+            GROUND => match (self.rules.hills(), self.rules.ground) {
+                (Some(relief), _) => relief.soil.surface,
+                (None, ground) => ground.map(|ground| ground.surface()).unwrap_or_default(),
+            },
             index => self.solid(index).surface,
         }
     }
@@ -78,6 +86,9 @@ impl Scene<'_> {
         });
         if let Some(ground) = self.rules.ground {
             found.extend(self.above(&ground, motion).min_by(|a, b| a.gap.total_cmp(&b.gap)));
+        }
+        if let Some(relief) = self.rules.hills() {
+            found.extend(relief.facings(self.rules, motion, margin));
         }
         found.retain(|facing| facing.gap <= margin);
         found
@@ -174,6 +185,9 @@ impl Scene<'_> {
         if let Some(ground) = &self.rules.ground {
             found.extend(self.above(ground, motion).filter(|facing| facing.gap <= margin));
         }
+        if let Some(relief) = self.rules.hills() {
+            found.extend(relief.facings(self.rules, motion, margin));
+        }
         found
     }
 
@@ -184,9 +198,11 @@ impl Scene<'_> {
 
     /// The numbers of the solids that the body overlaps by more than a depth.
     pub(crate) fn overlapped(&self, motion: &Motion, time: f64, depth: f64) -> Vec<u64> {
-        let narrow = self.narrowest(motion, time, 0.0);
-        let deep = narrow.iter().filter(|facing| facing.number != GROUND && facing.gap < -depth);
-        let mut found: Vec<u64> = deep.map(|facing| self.solid(facing.number).number).collect();
+        let mut found = Vec::new();
+        self.pairs(motion, time, |index, (part, own), (shape, other)| {
+            let facing = self.facing((index, motion), (part, own), (shape, other), -depth);
+            found.extend(facing.filter(|facing| facing.gap < -depth).map(|_| self.solid(index).number));
+        });
         found.sort_unstable();
         found.dedup();
         found

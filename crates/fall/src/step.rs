@@ -66,6 +66,16 @@ impl Step {
         self.bound_with(bend, distance)
     }
 
+    /// A bound of the way of all points of a body within a distance from its centre, in m.
+    pub(crate) fn swept(&self, distance: f64) -> f64 {
+        let span = self.span();
+        let [u, v] = self.turning.map(|rate| rate * span);
+        let turn = (self.turned * 6.0 - u * 4.0 - v * 2.0)
+            .norm()
+            .max((self.turned * 6.0 - u * 2.0 - v * 4.0).norm());
+        self.speed() * span + distance * (u.norm() + turn)
+    }
+
     /// A bound of the speed of the centre of mass, in m/s.
     pub(crate) fn speed(&self) -> f64 {
         let span = self.span();

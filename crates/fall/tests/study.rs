@@ -92,3 +92,13 @@ fn random_throws_rest_above_ground() -> Result<(), dlsys_fall::Error> {
     }
     Ok(())
 }
+
+/// Slopes of soil: rolling and sliding at their accelerations, first order as all contact; a block that friction holds stays.
+#[test]
+fn bodies_roll_and_slide_down_soil() -> Result<(), dlsys_fall::Error> {
+    let rows = study::roll_on_soil()?;
+    check(&rows, 2e-4);
+    assert!(rows.iter().all(|row| row.order.is_none_or(|order| order > 0.35)), "{rows:?}");
+    check(&study::slope_of_soil()?, 2e-4);
+    Ok(())
+}

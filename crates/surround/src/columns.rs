@@ -66,6 +66,13 @@ fn describe(bed: &Bed, soil: &Soil, metre: f64) -> Description {
     }
 }
 
+/// How soil holds what lands on it: with a friction that is the tangent of its angle of repose, up to that of 45°, as the soil gives way above; without rebounds; and with
+/// the resistance to rolling of sand, 0.3, or with cohesion of medium hard soil, 0.08 (Gillespie, *Fundamentals of Vehicle Dynamics*, 1992, table 4.1).
+pub(crate) fn grip(soil: &ground::Soil) -> dlsys_fall::Surface {
+    let rolling = if soil.cohesion > 0.0 { 0.08 } else { 0.3 };
+    dlsys_fall::Surface { friction: soil.slope().min(1.0), restitution: 0.0, rolling }
+}
+
 /// A soil with what it has of its base.
 fn material(soil: &Soil) -> ground::Soil {
     let base = match soil.base {

@@ -2,7 +2,7 @@
 //!
 //! A release is found when growth passes the production that makes the module. The part then has the pose in which the branch holds
 //! it, and the velocity that it has there: both from two drawings, the second a little later, as if the branch still held it. So
-//! growth, stems in the wind, and other flights give their motion to what they let go. On its way it meets the solids of the scene.
+//! growth, stems in the wind, and other flights give their motion to what they let go. On its way it meets the solids of the scene and its soil.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -20,7 +20,6 @@ use crate::bending::BentStems;
 use crate::body::rotation_vector;
 use crate::descent::Descent;
 use crate::loose::{Loose, stand};
-use crate::obstacles::{Among, Obstacles};
 use crate::place::Place;
 use crate::points::{Pair, rigid_motion};
 use crate::weather::{Gusts, Sampler};
@@ -176,13 +175,7 @@ impl<'m> Flights<'m> {
                         loose.attitude.inverse_transform_vector(&(here.0 - loose.centre)),
                         loose.attitude.inverse().to_rotation_matrix().into_inner() * here.1,
                     );
-                    // Soil is as level there as it is below the release.
-                    let level = || {
-                        let bed = model.scenery.bed.as_ref()?;
-                        let at = loose.centre / place.units.length;
-                        Some(bed.surface(at.x, at.z) * place.units.length)
-                    };
-                    let ground = place.ground.or_else(level).map(Ground::at);
+                    let ground = place.ground.map(Ground::at);
                     let mut fall =
                         Fall::new(loose.body, motion, time, ground, self.settings).map_err(failed)?;
                     // For files that play, whose times go to and fro.
@@ -275,11 +268,11 @@ impl<'m> Flights<'m> {
             None => (*offset, *axes),
             Some(fall) => {
                 let gusts = Gusts(&self.wind);
-                let obstacles = self.wind.obstacles();
-                let moved = fall.among(time, &gusts, &Among(obstacles)).map_err(|error| {
+                let among = self.wind.in_the_way();
+                let moved = fall.among(time, &gusts, &among).map_err(|error| {
                     // An earlier failure of solids is not the reason of another one.
                     let of_solids = matches!(error, fall::Error::Solids { .. });
-                    let known = obstacles.filter(|_| of_solids).and_then(Obstacles::failure);
+                    let known = if of_solids { among.failure() } else { None };
                     let failed =
                         Error::falling(model, origin, Some(fall.body()), (error, place.time_at(time)));
                     known.or_else(|| self.wind.failure()).unwrap_or(failed)

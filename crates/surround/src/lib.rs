@@ -33,6 +33,7 @@ mod descent;
 mod drift;
 mod error;
 mod flights;
+mod footing;
 mod gases;
 mod hanging;
 mod layers;

@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use dlsys_diagnostic::Span as Text;
-use dlsys_fall::{self as fall, Obstacle, Obstacles as Way, Span, Surface};
+use dlsys_fall::{self as fall, Obstacle, Span, Surface};
 use dlsys_geometry::scene::Scene;
 use dlsys_geometry::turtle;
 use dlsys_model::Model;
@@ -126,6 +126,14 @@ impl<'m> Obstacles<'m> {
         found
     }
 
+    /// The solids in the way of a flight at a time in s.
+    pub(crate) fn at_time(&self, time: f64) -> Result<Arc<Span>, fall::Error> {
+        self.at(time).map_err(|error| {
+            *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+            fall::Error::Solids { time }
+        })
+    }
+
     fn begin(&self) -> Result<Runs<'m>, Error> {
         let growth = coupled::start(self.model, self.settings, self.place)?;
         let scene = turtle::blank(self.model);
@@ -208,18 +216,5 @@ impl Run<'_> {
         let span = Span::new(begin, begin + TICK, solids);
         let span = span.map_err(|error| Error::Obstacle { error, time, span: among.text() })?;
         Ok(Tick { span: Arc::new(span), failed })
-    }
-}
-
-/// The solids in the way of a flight, if there are any.
-pub(crate) struct Among<'a, 'm>(pub(crate) Option<&'a Obstacles<'m>>);
-
-impl Way for Among<'_, '_> {
-    fn span(&self, time: f64) -> Result<Option<Arc<Span>>, fall::Error> {
-        let Some(obstacles) = self.0 else { return Ok(None) };
-        obstacles.at(time).map(Some).map_err(|error| {
-            *obstacles.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-            fall::Error::Solids { time }
-        })
     }
 }

@@ -246,6 +246,17 @@ impl<'m> Terrain<'m> {
         }
     }
 
+    /// The ground at a tick, and whether nothing can move it any more, as it is without stems that bend.
+    ///
+    /// # Errors
+    /// As of [`Terrain::at`].
+    pub(crate) fn columns(&self, number: u64) -> Result<(Ground, bool), Error> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let Moment { ground, .. } = self.reach_tick(&mut state, number as f64, None)?;
+        let rests = self.rests(&ground);
+        Ok((ground, rests))
+    }
+
     /// Nothing can move a ground any more.
     fn rests(&self, ground: &Ground) -> bool {
         !self.has_bodies && self.model.scenery.pours.is_empty() && ground.is_at_rest()

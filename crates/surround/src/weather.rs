@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use dlsys_diagnostic::Span;
 use dlsys_expr::Program;
+use dlsys_geometry::turtle;
 use dlsys_model::{self as model, Model, Primitive, Scenery, Units};
 use dlsys_sim::Settings;
 use dlsys_sway as sway;
@@ -13,6 +14,7 @@ use dlsys_wind::{
 };
 use nalgebra::Vector3;
 
+use crate::footing::{Among, Footing};
 use crate::obstacles::Obstacles;
 use crate::solids::Solids;
 use crate::{Error, Place};
@@ -23,6 +25,8 @@ pub struct Weather<'m> {
     solids: Option<Arc<Solids<'m>>>,
     /// The same bodies in the way of what falls.
     obstacles: Option<Arc<Obstacles<'m>>>,
+    /// The soil on which it lands.
+    footing: Option<Arc<Footing<'m>>>,
     /// The last instants with bodies.
     recent: Recent,
 }
@@ -82,11 +86,12 @@ impl Spans {
 }
 
 impl Declared {
-    /// The wind and the flows that a model declares; `None` if it declares neither, and no bodies that may move the air.
-    fn of(scenery: &Scenery) -> Result<Option<Arc<Declared>>, Error> {
+    /// The wind and the flows that a model declares; `None` if it declares neither, and no bodies that may move the air, and no soil on which something lands.
+    fn of(scenery: &Scenery, soil: Option<Span>) -> Result<Option<Arc<Declared>>, Error> {
         let Scenery { wind, flows, solids, .. } = scenery;
         let span = wind.as_ref().map(|wind| wind.span).or(flows.first().map(|flow| flow.span));
-        let Some(span) = span.or(solids.first().map(|(_, span)| *span)) else { return Ok(None) };
+        let span = span.or(solids.first().map(|(_, span)| *span)).or(soil);
+        let Some(span) = span else { return Ok(None) };
         scenery.field.get_or_make(|| Declared::new(scenery, span, 0.0))
     }
 
@@ -115,15 +120,17 @@ impl Declared {
 
 impl<'m> Weather<'m> {
     /// The wind and the flows that a model declares, pushed aside by its bodies as they move in a run with these settings; `None` if it
-    /// declares none of them.
+    /// declares none of them, and no soil on which something may land.
     ///
     /// # Errors
     /// A value that is out of range, with the place of its declaration; bodies of a model whose rules read `strain`.
     pub fn of(model: &'m Model, settings: Settings) -> Result<Option<Arc<Weather<'m>>>, Error> {
-        let Some(declared) = Declared::of(&model.scenery)? else { return Ok(None) };
+        let soil = Footing::declared(model).filter(|_| lets_go(model));
+        let Some(declared) = Declared::of(&model.scenery, soil)? else { return Ok(None) };
         let solids = Solids::new(model, settings)?.map(Arc::new);
         let obstacles = Obstacles::new(model, settings).map(Arc::new);
-        Ok(Some(Arc::new(Weather { declared, solids, obstacles, recent: Recent::default() })))
+        let footing = Footing::new(model, settings).map(Arc::new);
+        Ok(Some(Arc::new(Weather { declared, solids, obstacles, footing, recent: Recent::default() })))
     }
 
     /// The wind and the flows that a model declares, whatever bodies it has; `None` if it declares neither.
@@ -134,9 +141,10 @@ impl<'m> Weather<'m> {
         if scenery.wind.is_none() && scenery.flows.is_empty() {
             return Ok(None);
         }
-        let declared = Declared::of(scenery)?;
+        let declared = Declared::of(scenery, None)?;
         let weather = |declared| {
-            Arc::new(Weather { declared, solids: None, obstacles: None, recent: Recent::default() })
+            let (obstacles, footing) = (None, None);
+            Arc::new(Weather { declared, solids: None, obstacles, footing, recent: Recent::default() })
         };
         Ok(declared.map(weather))
     }
@@ -146,9 +154,10 @@ impl<'m> Weather<'m> {
         if let Some((_, span)) = scenery.solids.first() {
             return Err(Error::SolidInLoop { span: *span });
         }
-        let declared = Declared::of(scenery)?;
+        let declared = Declared::of(scenery, None)?;
         let weather = |declared| {
-            Arc::new(Weather { declared, solids: None, obstacles: None, recent: Recent::default() })
+            let (obstacles, footing) = (None, None);
+            Arc::new(Weather { declared, solids: None, obstacles, footing, recent: Recent::default() })
         };
         Ok(declared.map(weather))
     }
@@ -162,8 +171,9 @@ impl<'m> Weather<'m> {
             Some(eddy) if size > NOTHING * eddy => Declared::new(scenery, self.declared.spans.wind, size)?,
             _ => Arc::clone(&self.declared),
         };
-        let (solids, obstacles) = (self.solids.clone(), self.obstacles.clone());
-        Ok(Weather { declared, solids, obstacles, recent: Recent::default() })
+        let (solids, obstacles, footing) =
+            (self.solids.clone(), self.obstacles.clone(), self.footing.clone());
+        Ok(Weather { declared, solids, obstacles, footing, recent: Recent::default() })
     }
 
     /// The field without bodies.
@@ -223,6 +233,11 @@ impl<'m> Weather<'m> {
         };
         self.recent.get_or_make(time, make)
     }
+}
+
+/// True if a model, or a plant in it, may let go of something.
+fn lets_go(model: &Model) -> bool {
+    turtle::lets_go(model) || model.scenery.plants.iter().any(|plant| lets_go(&plant.model))
 }
 
 /// A function of the model's time as a signal in seconds, times a factor.
@@ -291,9 +306,11 @@ impl<'m> Sampler<'m> {
         Sampler { weather, last: Mutex::default(), failure: Mutex::default(), place }
     }
 
-    /// The solids in the way of what falls, if there are any.
-    pub(crate) fn obstacles(&self) -> Option<&Obstacles<'m>> {
-        self.weather.as_ref()?.obstacles.as_deref()
+    /// What is in the way of what falls.
+    pub(crate) fn in_the_way(&self) -> Among<'_, 'm> {
+        let weather = self.weather.as_ref();
+        let obstacles = weather.and_then(|weather| weather.obstacles.as_deref());
+        Among { obstacles, footing: weather.and_then(|weather| weather.footing.as_deref()) }
     }
 
     /// True if the air moves somewhere at some time.

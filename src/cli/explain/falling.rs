@@ -182,7 +182,11 @@ fn row(
         );
     }
     let has_ground = scene.scenery.ground.is_some() || scene.scenery.bed.is_some();
+    let moves = scene.scenery.bed.is_some() && !scene.scenery.pours.is_empty();
     let ends = match (scene.scenery.solids.is_empty(), has_ground) {
+        (true, true) if moves => {
+            "until it lies still on the soil; while no soil goes from below it there is nothing to do"
+        }
         (true, true) => "until it lies still on the ground; from then on there is nothing to do",
         (true, false) => "without end, because there is no `ground`",
         (false, true) => {
