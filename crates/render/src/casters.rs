@@ -22,7 +22,8 @@ pub(super) type CutTriangle<'s> = ([u32; 3], [[f64; 2]; 3], &'s Texture);
 /// Triangles and thin stems, relative to the middle of the box around everything.
 #[derive(Default)]
 pub(super) struct Batch<'s> {
-    pub(super) vertices: Vec<[f32; 3]>,
+    /// By coordinate.
+    pub(super) vertices: [Vec<f32>; 3],
     /// Corners by number of a vertex.
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) cut: Vec<CutTriangle<'s>>,
@@ -37,7 +38,7 @@ impl Batch<'_> {
     }
 
     fn clear(&mut self) {
-        self.vertices.clear();
+        self.vertices.iter_mut().for_each(Vec::clear);
         self.triangles.clear();
         self.cut.clear();
         self.lines.clear();
@@ -207,10 +208,12 @@ impl<'s> Casters<'s> {
                     let corners = self.casting(faces, place).flat_map(|face| face.corners.map(|(v, _)| v));
                     let (low, end) =
                         corners.fold((u32::MAX, 0), |(low, end), v| (low.min(v), end.max(v + 1)));
-                    let first = batch.vertices.len() as u32;
+                    let first = batch.vertices[0].len() as u32;
                     let vertices = draft.mesh.vertices.get(low as usize..end as usize).unwrap_or_default();
                     let placed = vertices.iter().map(|&p| relative(place.map_or(p, |place| place.point(p))));
-                    batch.vertices.extend(placed);
+                    for p in placed {
+                        batch.vertices.iter_mut().zip(p).for_each(|(all, x)| all.push(x));
+                    }
                     for face in self.casting(faces, place) {
                         let corners = face.corners.map(|(v, _)| first + (v - low));
                         match draft.cut_out(face) {
@@ -268,9 +271,9 @@ mod tests {
         let collect = |casters: &Casters| {
             let (mut all, mut most) = (Vec::new(), 0);
             casters.each_batch(|batch| {
-                let corners = |t: &[u32; 3]| t.map(|v| batch.vertices[v as usize]);
+                let corners = |t: &[u32; 3]| t.map(|v| batch.vertices.each_ref().map(|all| all[v as usize]));
                 all.extend(batch.triangles.iter().map(corners));
-                most = most.max(batch.triangles.len().max(batch.vertices.len()));
+                most = most.max(batch.triangles.len().max(batch.vertices[0].len()));
             });
             (all, most)
         };

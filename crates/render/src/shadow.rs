@@ -26,6 +26,47 @@ const COARSE: f64 = 128.0;
 const BIAS: f32 = 1.0;
 const SLOPE: f32 = 8.0;
 
+/// The vertices of a batch in a map, by coordinate: many are placed at once.
+#[derive(Default)]
+struct Placed {
+    at: [Vec<f32>; 3],
+    /// The first column and row whose middles are not before it, in the upper and the lower half of the bits.
+    cells: Vec<u32>,
+}
+
+impl Placed {
+    /// Places vertices, given the function of each coordinate, in a map of this size.
+    fn fill(&mut self, [x, y, z]: &[Vec<f32>; 3], along: impl Fn(usize, [f32; 3]) -> f32, size: [usize; 2]) {
+        for (k, at) in self.at.iter_mut().enumerate() {
+            at.clear();
+            at.extend(x.iter().zip(y).zip(z).map(|((&x, &y), &z)| along(k, [x, y, z])));
+        }
+        let [right, up, _] = &self.at;
+        // Maps have fewer than 2^16 cells on a side.
+        let [width, height] = size.map(|side| side as f32);
+        // In this form, as 32-bit integers, several are computed at once.
+        let cell = |at: f32, side: f32| {
+            let at = if at + 0.5 > 0.0 { at + 0.5 } else { 0.0 };
+            (if at < side { at } else { side }) as i32
+        };
+        self.cells.clear();
+        let cells = right.iter().zip(up).map(|(x, y)| (cell(*x, width) << 16 | cell(*y, height)) as u32);
+        self.cells.extend(cells);
+    }
+
+    /// Whether a triangle may cover the middle of a cell. Most are smaller than a cell and do not: then there is no middle of a column, or none of
+    /// a row, between its corners.
+    fn may_cover(&self, corners: &[u32; 3]) -> bool {
+        let [p, q, r] = corners.map(|v| self.cells[v as usize]);
+        let apart = (p ^ q) | (p ^ r);
+        apart >> 16 != 0 && apart & 0xffff != 0
+    }
+
+    fn at(&self, corners: &[u32; 3]) -> [[f32; 3]; 3] {
+        corners.map(|v| self.at.each_ref().map(|at| at[v as usize]))
+    }
+}
+
 /// Depths towards a light.
 struct Map {
     /// To the right, up, and towards the light.
@@ -55,20 +96,24 @@ impl Map {
         Map { axes, middle, low, scale, size, depths: vec![f32::NEG_INFINITY; size[0] * size[1]] }
     }
 
-    /// Adds triangles and thin stems.
-    fn add(&mut self, batch: &Batch) {
+    /// Adds triangles and thin stems. `placed` is memory.
+    fn add(&mut self, batch: &Batch, placed: &mut Placed) {
         let Map { axes, low, scale, .. } = *self;
         let scaled = axes.map(|axis| [axis.x, axis.y, axis.z].map(|x| (x * scale) as f32));
         let from = [(low[0] * scale) as f32, (low[1] * scale) as f32, 0.0];
-        let place = |p: &[f32; 3]| {
-            [0, 1, 2].map(|k| scaled[k][0] * p[0] + scaled[k][1] * p[1] + scaled[k][2] * p[2] - from[k])
+        let along = |k: usize, [x, y, z]: [f32; 3]| {
+            let [right, up, towards] = scaled[k];
+            right * x + up * y + towards * z - from[k]
         };
-        let placed: Vec<[f32; 3]> = batch.vertices.iter().map(place).collect();
+        let place = |p: &[f32; 3]| [0, 1, 2].map(|k| along(k, *p));
+        placed.fill(&batch.vertices, along, self.size);
         for corners in &batch.triangles {
-            self.fill(corners.map(|v| placed[v as usize]), |_| true);
+            if placed.may_cover(corners) {
+                self.fill(placed.at(corners), |_| true);
+            }
         }
         for (corners, places, texture) in &batch.cut {
-            let corners = corners.map(|v| placed[v as usize]);
+            let corners = placed.at(corners);
             let pinned = [0, 1, 2].map(|k| Pinned {
                 at: [corners[k][0].into(), corners[k][1].into()],
                 place: places[k],
@@ -107,7 +152,6 @@ impl Map {
 
     /// Keeps the nearest of a triangle in each cell whose middle it covers, if it `is_drawn` there; on its edge counts as within.
     fn fill(&mut self, [p, q, r]: [[f32; 3]; 3], is_drawn: impl Fn([f32; 2]) -> bool) {
-        // Most triangles are smaller than a cell and cover the middle of none.
         let range = |k: usize| {
             let low = p[k].min(q[k]).min(r[k]) + 0.5;
             let high = p[k].max(q[k]).max(r[k]) + 0.5;
@@ -211,8 +255,9 @@ impl Maps {
             let next = Mutex::new(maps.iter_mut());
             let work = || {
                 let take = || next.lock().unwrap_or_else(PoisonError::into_inner).next();
+                let mut placed = Placed::default();
                 while let Some(map) = take() {
-                    map.add(batch);
+                    map.add(batch, &mut placed);
                 }
             };
             std::thread::scope(|scope| {
