@@ -418,6 +418,12 @@ impl<'m> Simulation<'m> {
         self.log.events.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
+    /// Productions that were computed chain by chain, without the queue (differential tests).
+    #[doc(hidden)]
+    pub fn productions_in_chains(&self) -> u64 {
+        self.chains.productions
+    }
+
     /// Bytes that a copy takes, about.
     pub fn size(&self) -> usize {
         let around = self.surroundings.as_ref().map_or(0, |link| link.size());

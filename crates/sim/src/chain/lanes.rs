@@ -136,7 +136,10 @@ impl Block {
             }
             for lane in 0..self.count {
                 let like = original[lane];
-                if first && like != usize::MAX && let Some(fate) = self.again(fates[like], lasting[like], [like, lane]) {
+                if first
+                    && like != usize::MAX
+                    && let Some(fate) = self.again(fates[like], lasting[like], [like, lane])
+                {
                     (fates[lane], open[lane]) = (fate, false);
                 }
             }
@@ -156,8 +159,8 @@ impl Block {
             for (side, sign) in sides.chunks(2).zip(&class.signs) {
                 let (a, b) = (&self.registers[side[0]], &self.registers[side[1]]);
                 for lane in 0..self.count {
-                    is_like[lane] &= is_clear(a[lane], b[lane], scale[lane])
-                        && sign_at_birth(a[lane], b[lane]) == *sign;
+                    is_like[lane] &=
+                        is_clear(a[lane], b[lane], scale[lane]) && sign_at_birth(a[lane], b[lane]) == *sign;
                 }
             }
             for lane in 0..self.count {
@@ -211,9 +214,9 @@ impl Block {
                 continue;
             }
             let equation = clause.and_then(|clause| clause.of.iter().position(|of| of == variable));
-            let law = equation.zip(clause).map(|(equation, clause)| {
-                (&clause.solution_forms[equation], &coefficients[equation])
-            });
+            let law = equation
+                .zip(clause)
+                .map(|(equation, clause)| (&clause.solution_forms[equation], &coefficients[equation]));
             let levels = &levels[atom];
             let mut meet_one = |lane: usize, trajectory: Option<&Trajectory>| {
                 let (level, start) = (levels[lane], registers[*variable][lane]);

@@ -47,11 +47,19 @@ pub struct Chains {
     mark: (SimTime, u64),
     /// The time that the last plan took, as far as it is known.
     length: Option<f64>,
+    /// Productions in chains so far.
+    pub productions: u64,
 }
 
 impl Default for Chains {
     fn default() -> Chains {
-        Chains { next: FIRST_PAUSE, pause: FIRST_PAUSE, mark: (SimTime::ZERO, 0), length: None }
+        Chains {
+            next: FIRST_PAUSE,
+            pause: FIRST_PAUSE,
+            mark: (SimTime::ZERO, 0),
+            length: None,
+            productions: 0,
+        }
     }
 }
 
@@ -122,9 +130,11 @@ impl Simulation<'_> {
         let laws = Law::all(self.setup.model, &self.world.lives);
         let mut slots = Vec::new();
         self.schedule.take_lazy_before(until, &mut slots);
+        // Where newborns are alike, the events after the plan are in the same order then: so the queue has it easy.
+        order::sort_by_time(&mut slots, |(time, _)| *time, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut limit = until;
         for &(time, slot) in &slots {
-            let label = self.world.tree.look(slot).label;
+            let label = self.world.tree.label(self.world.tree.id(slot));
             if laws.get(usize::from(label)).is_none_or(Option::is_none) {
                 limit = limit.min(short_of(time));
             }
@@ -179,19 +189,19 @@ impl Simulation<'_> {
             }
         }
         for runner in plan.runners.iter().filter(|runner| runner.productions > 0) {
-            let (first, end) = runner.values;
-            let arguments = &plan.values[first as usize..end as usize];
-            let plan::Runner { kind, birth, family, label, productions, .. } = *runner;
+            let plan::Runner { slot, kind, birth, family, label, productions, next, values, .. } = *runner;
+            let arguments = &plan.values[values.0 as usize..values.1 as usize];
             let last = LastOfChain { kind, arguments, birth, family, label, productions };
-            self.world.tree.replace_chain(runner.slot, &last);
-            if let Some(time) = runner.next {
-                self.schedule.schedule_lazy(time, runner.slot);
+            self.world.tree.replace_chain(slot, &last);
+            if let Some(time) = next {
+                self.schedule.schedule_lazy(time, slot);
             }
         }
         self.instant.at = last.at;
         self.instant.number += instants;
         self.world.structure += instants;
         self.log.stats.events += plan.events.len() as u64;
+        self.chains.productions += plan.events.len() as u64;
         self.schedule.passed += instants;
         self.schedule.last = Some((last.at, true));
         self.goes_on();

@@ -9,38 +9,48 @@ pub struct Happened {
     pub at: SimTime,
     /// Of the module that is replaced.
     pub slot: u32,
-    /// Its place among those that are logged.
+    /// The number of the production in the plan.
     pub entry: u32,
 }
 
-/// The order of the schedule: instants, then slots.
-fn compare(a: &Happened, b: &Happened) -> Ordering {
-    a.at.partial_cmp(&b.at).unwrap_or(Ordering::Equal).then(a.slot.cmp(&b.slot))
+/// Sorts productions as the schedule does, by instants, then slots.
+pub fn sort(events: &mut Vec<Happened>) {
+    let compare = |a: &Happened, b: &Happened| {
+        a.at.partial_cmp(&b.at).unwrap_or(Ordering::Equal).then(a.slot.cmp(&b.slot))
+    };
+    sort_by_time(events, |event| event.at.to_f64(), compare);
 }
 
-/// Sorts productions. They are about evenly distributed over some time, so that each is near its place when all are put into as many
-/// equal parts of that time.
-pub fn sort(events: &mut Vec<Happened>) {
-    let times = || events.iter().map(|event| event.at.to_f64());
-    let (first, last) = (times().fold(f64::INFINITY, f64::min), times().fold(f64::NEG_INFINITY, f64::max));
-    let scale = events.len() as f64 / (last - first);
-    if !(scale > 0.0 && scale.is_finite()) {
-        return events.sort_unstable_by(compare);
+/// Sorts things by their times, and what has one time by a comparison that begins with times. They are about evenly distributed over some
+/// time, so that each is near its place when all are put into as many equal parts of that time.
+pub fn sort_by_time<T: Copy>(
+    all: &mut Vec<T>,
+    time: impl Fn(&T) -> f64,
+    compare: impl Fn(&T, &T) -> Ordering + Copy,
+) {
+    if all.is_sorted_by(|a, b| compare(a, b) != Ordering::Greater) {
+        return;
     }
-    let last_part = events.len() - 1;
-    let part = |event: &Happened| (((event.at.to_f64() - first) * scale) as usize).min(last_part);
-    // Where each part begins, then where its next production goes to.
-    let mut places = vec![0u32; events.len() + 1];
-    for event in &*events {
-        places[part(event) + 1] += 1;
+    let first = all.iter().map(&time).fold(f64::INFINITY, f64::min);
+    let last = all.iter().map(&time).fold(f64::NEG_INFINITY, f64::max);
+    let scale = all.len() as f64 / (last - first);
+    if !(scale > 0.0 && scale.is_finite()) {
+        return all.sort_by(compare);
+    }
+    let last_part = all.len() - 1;
+    let part = |one: &T| (((time(one) - first) * scale) as usize).min(last_part);
+    // Where each part begins, then where its next one goes to.
+    let mut places = vec![0u32; all.len() + 1];
+    for one in &*all {
+        places[part(one) + 1] += 1;
     }
     for i in 1..places.len() {
         places[i] += places[i - 1];
     }
-    let mut sorted = events.clone();
-    for event in &*events {
-        let place = &mut places[part(event)];
-        sorted[*place as usize] = *event;
+    let mut sorted = all.clone();
+    for one in &*all {
+        let place = &mut places[part(one)];
+        sorted[*place as usize] = *one;
         *place += 1;
     }
     // A place is now the end of its part.
@@ -48,11 +58,12 @@ pub fn sort(events: &mut Vec<Happened>) {
     for &end in &places[..places.len() - 1] {
         let end = end as usize;
         if end - begin > 1 {
-            sorted[begin..end].sort_unstable_by(compare);
+            // Twins come in the order of their slots: a stable sort finds that.
+            sorted[begin..end].sort_by(compare);
         }
         begin = end;
     }
-    *events = sorted;
+    *all = sorted;
 }
 
 /// The first of sorted productions that is so near the next one that both are one instant, though their computed times differ: what takes
@@ -83,7 +94,7 @@ mod tests {
                 events.push(at((3_000_000_000, 0, 0)));
             }
             let mut expected = events.clone();
-            expected.sort_by(compare);
+            expected.sort_by(|a, b| a.at.partial_cmp(&b.at).expect("numbers").then(a.slot.cmp(&b.slot)));
             sort(&mut events);
             prop_assert_eq!(events, expected);
         }

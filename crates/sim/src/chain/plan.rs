@@ -60,6 +60,7 @@ pub struct Logged {
 #[derive(Debug, Default)]
 pub struct Plan {
     pub events: Vec<Happened>,
+    /// By entry, if productions are logged.
     pub logged: Vec<Logged>,
     pub runners: Vec<Runner>,
     pub values: Vec<f64>,
@@ -90,20 +91,24 @@ impl Crowd {
         self.values.extend(values);
     }
 
-    /// Takes up to [`LANES`] modules out, with as many parameters each, into a block.
-    fn take(&mut self, width: usize, block: &mut Block, walkers: &mut Vec<Walker>) {
-        let rest = self.walkers.len().saturating_sub(LANES);
-        walkers.clear();
-        walkers.extend(self.walkers.drain(rest..));
-        block.count = walkers.len();
-        for (lane, values) in self.values[rest * width..].chunks(width.max(1)).enumerate() {
+    /// Puts up to [`LANES`] modules from one on, with as many parameters each, into a block; returns the number of the next one.
+    fn load(&self, first: usize, width: usize, block: &mut Block) -> usize {
+        let next = (first + LANES).min(self.walkers.len());
+        let values = self.values[first * width..next * width].chunks(width.max(1));
+        for (lane, values) in values.enumerate() {
             for (register, x) in block.registers.iter_mut().zip(values) {
                 register[lane] = *x;
             }
         }
-        self.values.truncate(rest * width);
+        block.count = next - first;
         block.births.clear();
-        block.births.extend(walkers.iter().map(|walker| walker.birth));
+        block.births.extend(self.walkers[first..next].iter().map(|walker| walker.birth));
+        next
+    }
+
+    fn clear(&mut self) {
+        self.walkers.clear();
+        self.values.clear();
     }
 }
 
@@ -113,8 +118,9 @@ pub struct Planner<'a, 'm> {
     plan: Plan,
     /// By label: lives whose events come before the limit.
     crowds: Vec<Crowd>,
+    /// An empty one, with its memory.
+    spare: Crowd,
     block: Block,
-    walkers: Vec<Walker>,
     fates: Vec<Fate>,
     arguments: Vec<Lanes>,
 }
@@ -123,8 +129,8 @@ impl<'a, 'm> Planner<'a, 'm> {
     pub fn new(course: Course<'a, 'm>) -> Planner<'a, 'm> {
         let crowds = course.laws.iter().map(|_| Crowd::default()).collect();
         let plan = Plan { cut: f64::INFINITY, ..Plan::default() };
-        let (block, walkers, fates, arguments) = Default::default();
-        Planner { course, plan, crowds, block, walkers, fates, arguments }
+        let (spare, block, fates, arguments) = Default::default();
+        Planner { course, plan, crowds, spare, block, fates, arguments }
     }
 
     pub fn plan(mut self, slots: &[(f64, u32)]) -> Plan {
@@ -134,7 +140,13 @@ impl<'a, 'm> Planner<'a, 'm> {
             while let Some(label) = (0..self.crowds.len()).max_by_key(|i| self.crowds[*i].walkers.len())
                 && !self.crowds[label].walkers.is_empty()
             {
-                self.step(label);
+                let crowd = std::mem::replace(&mut self.crowds[label], std::mem::take(&mut self.spare));
+                let mut first = 0;
+                while first < crowd.walkers.len() {
+                    first = self.step(label, &crowd, first);
+                }
+                self.spare = crowd;
+                self.spare.clear();
             }
         }
         self.plan
@@ -162,36 +174,38 @@ impl<'a, 'm> Planner<'a, 'm> {
             let walker = Walker { runner, birth, at: birth, level: 0.0 };
             starting[look.label as usize].add(walker, look.values.iter().copied());
         }
-        for (label, crowd) in starting.iter_mut().enumerate() {
+        for (label, crowd) in starting.iter().enumerate() {
             let Some(law) = &laws[label] else { continue };
-            while !crowd.walkers.is_empty() {
+            let mut first = 0;
+            while first < crowd.walkers.len() {
                 self.block.make_variables(law.rule);
-                crowd.take(law.rule.parameters.len(), &mut self.block, &mut self.walkers);
+                let next = crowd.load(first, law.rule.parameters.len(), &mut self.block);
                 self.block.foresee(lives, law.rule, Some(label as u16), &mut self.fates);
-                for lane in 0..self.block.count {
-                    let walker = self.walkers[lane];
+                for (lane, walker) in crowd.walkers[first..next].iter().enumerate() {
                     match self.fates[lane] {
                         Fate::Ends(same, at, level) if usize::from(same) == label => {
                             let width = law.rule.parameters.len();
                             let values = self.block.registers[..width].iter().map(|lanes| lanes[lane]);
-                            self.crowds[label].add(Walker { at, level, ..walker }, values);
+                            self.crowds[label].add(Walker { at, level, ..*walker }, values);
                         }
                         // Not so: it is the life that was foreseen at birth.
                         _ => self.plan.cut = f64::NEG_INFINITY,
                     }
                 }
+                first = next;
             }
         }
     }
 
-    /// Lets up to [`LANES`] lives of a class end.
-    fn step(&mut self, label: usize) {
+    /// Lets up to [`LANES`] lives of a class end, from one on; returns the number of the next one.
+    fn step(&mut self, label: usize, crowd: &Crowd, first: usize) -> usize {
         let Course { lives, laws, limit, logs, .. } = self.course;
-        let Some(law) = &laws[label] else { return };
-        let Planner { plan, crowds, block, walkers, fates, arguments, .. } = self;
+        let Some(law) = &laws[label] else { return crowd.walkers.len() };
+        let Planner { plan, crowds, block, fates, arguments, .. } = self;
         let rule = law.rule;
         block.make_variables(rule);
-        crowds[label].take(rule.parameters.len(), block, walkers);
+        let end = crowd.load(first, rule.parameters.len(), block);
+        let walkers = &crowd.walkers[first..end];
         block.end(law, walkers.iter().map(|walker| (walker.at, walker.level)));
         let residuals = if logs { block.residuals(rule, &law.at_boundary) } else { [0.0; LANES] };
         arguments.clear();
@@ -230,7 +244,7 @@ impl<'a, 'm> Planner<'a, 'm> {
                 let residual = residuals[lane];
                 plan.logged.push(Logged { lineage, kind, rule: rule.index, clause: law.produce, residual });
             }
-            let entry = plan.logged.len().saturating_sub(1) as u32;
+            let entry = plan.events.len() as u32;
             plan.events.push(Happened { at, slot: runner.slot, entry });
             runner.productions += 1;
             runner.kind = law.successor;
@@ -255,5 +269,6 @@ impl<'a, 'm> Planner<'a, 'm> {
             plan.values.extend(values);
             runner.values = (first as u32, plan.values.len() as u32);
         }
+        end
     }
 }

@@ -167,10 +167,10 @@ impl Schedule {
         mut instant_of: impl FnMut(&mut World, u32) -> SimTime,
     ) -> Option<(SimTime, u32)> {
         let next = self.calendar.earliest();
-        if let Some(head) = self.batch.head() {
-            if next.is_none_or(|next| next > self.batch.time) {
-                return Some(head);
-            }
+        if let Some(head) = self.batch.head()
+            && next.is_none_or(|next| next > self.batch.time)
+        {
+            return Some(head);
         }
         // An event may have been scheduled since that is not later.
         self.return_batch();
