@@ -73,7 +73,7 @@ impl Chains {
 
 /// The end of a stretch that keeps away from what happens at a time.
 fn short_of(time: f64) -> f64 {
-    time - APART * SimTime::new(time).resolution()
+    if time.is_finite() { time - APART * SimTime::new(time).resolution() } else { time }
 }
 
 impl Simulation<'_> {
