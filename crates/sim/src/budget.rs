@@ -85,6 +85,11 @@ impl Budget {
         done >= self.next || self.since.is_some()
     }
 
+    /// Productions that may follow, after so many productions and steps, before it is time to look again.
+    pub fn left(&self, settings: &Settings, done: u64) -> u64 {
+        if self.is_overtime(settings) { 0 } else { self.next.saturating_sub(done) }
+    }
+
     /// Checks that the next entry of the schedule may still be passed, on the way to some time.
     ///
     /// # Errors

@@ -13,6 +13,7 @@
 //! file and `observe` see all of them.
 
 use super::budget::{self, Budget};
+use super::chain::Chains;
 use super::error::{Error, Site};
 use super::event::{EventStage, Events, SHORT_LIFE, chance};
 use super::flow::{FlowStage, Flows, lazy};
@@ -52,7 +53,8 @@ pub struct Simulation<'m> {
     pub(super) scratch: Scratch,
     /// None for a model that reads nothing of its surroundings.
     pub(super) surroundings: Option<Box<Link<'m>>>,
-    budget: Budget,
+    pub(super) budget: Budget,
+    pub(super) chains: Chains,
     progress: Progress,
     /// The error with which the simulation has ended.
     fault: Option<Error>,
@@ -94,6 +96,7 @@ impl<'m> Simulation<'m> {
             scratch: Scratch::default(),
             surroundings: None,
             budget: Budget::default(),
+            chains: Chains::default(),
             progress: Progress::default(),
             fault: None,
             setup,
@@ -184,7 +187,7 @@ impl<'m> Simulation<'m> {
     /// As of [`Simulation::at`].
     pub fn pass(&mut self, t: f64) -> Result<(), Error> {
         self.guarded(|simulation| {
-            while simulation.advance_once(t)?.is_some() {}
+            while simulation.pass_chains(t) || simulation.advance_once(t)?.is_some() {}
             Ok(())
         })
     }
@@ -267,7 +270,7 @@ impl<'m> Simulation<'m> {
 
     /// Goes on from the end of a searched stretch.
     fn go_on(&mut self, entry: Entry) -> Result<(), Error> {
-        self.progress.stalled = 0;
+        self.goes_on();
         match entry.owner {
             Owner::Coupled => self.flow_stage().pass_coupled_step(entry.at),
             Owner::Derivation | Owner::Tick => unreachable!("they are events"),
@@ -363,6 +366,11 @@ impl<'m> Simulation<'m> {
         oldest
     }
 
+    /// Forgets signs that time hardly goes on.
+    pub(super) fn goes_on(&mut self) {
+        self.progress.stalled = 0;
+    }
+
     /// Checks that events do not pile up: a life about as short as the resolution of time, after a life as short, and so on.
     fn check_pace(&mut self, id: ModuleId) -> Result<(), Error> {
         let now = self.instant.at;
@@ -408,6 +416,12 @@ impl<'m> Simulation<'m> {
     /// The productions since the last call, in the order of time.
     pub fn take_events(&mut self) -> Vec<Event> {
         self.log.events.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Productions that were computed chain by chain, without the queue (differential tests).
+    #[doc(hidden)]
+    pub fn productions_in_chains(&self) -> u64 {
+        self.chains.productions
     }
 
     /// Bytes that a copy takes, about.

@@ -68,6 +68,7 @@
 
 mod access;
 mod budget;
+mod chain;
 mod detect;
 mod error;
 mod event;

@@ -31,5 +31,5 @@ pub use chance::{Purpose, Seed, key};
 pub use dlsys_expr::SimTime;
 pub use lineage::{Family, Lineage, mix};
 pub use string::{Module, ModuleString, Version};
-pub use tree::{ModuleId, ModuleView, NO_LABEL, Tree};
+pub use tree::{LastOfChain, ModuleId, ModuleView, NO_LABEL, Tree};
 pub use walk::{Visit, Walk};

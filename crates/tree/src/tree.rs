@@ -7,12 +7,15 @@
 //! A module is a record of 28 bytes and its parameters; its birth and lineage are stored with those of its siblings
 //! (`siblings.rs`). At a million modules, memory access dominates all costs.
 
+mod chain;
+
 use std::collections::TryReserveError;
 
 use smallvec::SmallVec;
 
 use super::siblings::{NO_GROUP, SiblingGroups};
 use super::{Family, Lineage, SimTime};
+pub use chain::LastOfChain;
 use dlsys_model::KindId;
 
 /// The branch that holds the main axis.
@@ -359,35 +362,17 @@ impl Tree {
         family: Family,
         made: &mut Vec<ModuleId>,
     ) {
-        let Node { before, after, group, .. } = *self.node(id);
-        self.groups.leave(group);
         if let [kind] = *kinds
             && kind != KindId::OPEN
         {
-            return self.succeed(id, kind, arguments, birth, family, made);
+            let last = LastOfChain { kind, arguments, birth, family, label: NO_LABEL, productions: 1 };
+            return made.push(self.replace_chain(id.slot, &last));
         }
+        let Node { before, after, group, .. } = *self.node(id);
+        self.groups.leave(group);
         self.release(id.slot);
         self.modules -= 1;
         self.insert(before, after, kinds, arguments, birth, family, made);
-    }
-
-    /// Puts a single module into the slot of another. The links of its neighbours stay valid, so that their memory is not touched.
-    fn succeed(
-        &mut self,
-        id: ModuleId,
-        kind: KindId,
-        arguments: &[f64],
-        birth: SimTime,
-        family: Family,
-        made: &mut Vec<ModuleId>,
-    ) {
-        self.vacate(id.slot);
-        let first = self.store(arguments);
-        let group = self.groups.begin(family, birth, 0);
-        self.groups.count(group, 1);
-        let node = &mut self.nodes[id.slot()];
-        (node.kind, node.first, node.group, node.place, node.label) = (kind, first, group, 0, NO_LABEL);
-        made.push(ModuleId { slot: id.slot, generation: node.generation });
     }
 
     /// Removes a module and all that follows on its axis, with all branches. Slots for which `keep` is true stay empty until they are

@@ -25,6 +25,7 @@ pub fn sign_of(sign: Sign) -> f64 {
 }
 
 /// The sign of the negated difference. Signs other than plus and minus are their own opposites.
+#[inline]
 pub fn opposite(sign: Sign) -> Sign {
     match sign {
         Sign::Plus => Sign::Minus,
@@ -85,6 +86,7 @@ pub fn matters(rule: &Rule, state: &State, at: &[Sign], after: &[Sign]) -> bool 
 }
 
 /// The sign of an atom at the birth of a module, from the values of its two sides.
+#[inline]
 pub fn sign_at_birth(a: f64, b: f64) -> Sign {
     let (difference, size) = (a - b, a.abs().max(b.abs()));
     let equal = size.is_finite() && difference.abs() <= EQUAL * size;
@@ -113,6 +115,7 @@ pub enum Reach {
 /// The time at which a variable with a closed form takes a level; None if it never does, or does not move. `time` is the
 /// index of `t`, `start` the value at the start of the trajectory, and `exact` computes the rate at the level from the
 /// equation as written.
+#[inline]
 pub fn reach(
     variable: usize,
     time: usize,

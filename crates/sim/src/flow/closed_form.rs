@@ -137,7 +137,7 @@ fn sums(solve: &Solve, time: usize, scratch: &mut Scratch, trajectories: &mut [T
 }
 
 /// Coefficients of the displacement whose rate is `Σ c_j age^j`, as powers of the time since a given age.
-fn integrated(c: &[f64], age: f64) -> [f64; 4] {
+pub fn integrated(c: &[f64], age: f64) -> [f64; 4] {
     let mut shifted = [0.0; 4];
     shifted[..c.len()].copy_from_slice(c);
     if age != 0.0 {

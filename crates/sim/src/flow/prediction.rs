@@ -41,12 +41,13 @@ pub enum PredictedEnd {
 }
 
 /// The instant at which the two sides of an atom meet.
-struct PredictedCrossing {
-    time: SimTime,
+#[derive(Clone, Copy, Debug)]
+pub struct PredictedCrossing {
+    pub time: SimTime,
     /// The time from birth, if it was found as that.
-    tau: Option<f64>,
+    pub tau: Option<f64>,
     /// The parameter that meets a level, and the level.
-    level: Option<(usize, f64)>,
+    pub level: Option<(usize, f64)>,
 }
 
 /// Predicts the life of a module that is born at an instant. The variables in `scratch` are its parameters, then `t` and
@@ -70,55 +71,113 @@ pub fn predict(rule: &Rule, birth: SimTime, scratch: &mut Scratch) -> Option<Pre
     let trajectories = trajectories(rule, active, scratch)?;
     let mut life = Prediction { solve, signs, trajectories, end: None, lasting: Some(None) };
     life.find_first_event(rule, birth, scratch)?;
-    for end in life.trajectories.iter().filter_map(Trajectory::end) {
-        match life.end {
-            Some(PredictedEnd::Event { change, .. }) if change.time.since(birth) < end => {}
-            _ => return None,
+    let event = match life.end {
+        Some(PredictedEnd::Event { change, .. }) => Some(change.time),
+        _ => None,
+    };
+    for trajectory in &life.trajectories {
+        match outlives(trajectory.end(), birth, event) {
+            Outlives::Always => {}
+            Outlives::Event => life.lasting = None,
+            Outlives::Not => return None,
         }
-        life.lasting = None;
     }
     Some(life)
+}
+
+/// How long a solution holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outlives {
+    /// For ever.
+    Always,
+    /// Beyond the event at which the life ends.
+    Event,
+    /// It ends before that, at a pole for instance.
+    Not,
+}
+
+/// How long a solution holds that ends some time after the birth, or never, in a life that ends with an event, or never.
+#[inline]
+pub fn outlives(end: Option<f64>, birth: SimTime, event: Option<SimTime>) -> Outlives {
+    let Some(end) = end else { return Outlives::Always };
+    match event.is_some_and(|at| at.since(birth) < end) {
+        true => Outlives::Event,
+        false => Outlives::Not,
+    }
 }
 
 impl Prediction {
     /// Finds the sign that becomes zero first, and the production that follows; None if that has no closed form.
     fn find_first_event(&mut self, rule: &Rule, birth: SimTime, scratch: &mut Scratch) -> Option<()> {
-        let mut first: Option<Change> = None;
-        for (atom, watch) in rule.zero_crossings(self.solve).iter().enumerate() {
-            if matches!(watch, ZeroCrossing::Search(_)) {
-                return None;
+        let (solve, trajectories) = (self.solve, &self.trajectories);
+        let meet = |atom: usize| crossing(rule, solve, atom, trajectories, birth, scratch);
+        let FirstCrossing { change, lasting } =
+            first_crossing(rule.zero_crossings(solve), &self.signs, birth, meet)?;
+        self.end = match change {
+            // If nothing follows from it, the general way searches on.
+            Some(change) => {
+                let produce = follows(rule, &self.signs, change.atom)?;
+                Some(PredictedEnd::Event { change, produce })
             }
-            let Some(crossing) = crossing(rule, self.solve, atom, &self.trajectories, birth, scratch) else {
-                continue;
-            };
-            let PredictedCrossing { time, tau, level } = crossing;
-            if time.since(birth) <= 0.0 {
-                self.lasting = None;
-                continue;
-            }
-            let change = Change { atom, time, at: Sign::Zero, after: opposite(self.signs[atom]), level };
-            let Some(known) = &mut first else {
-                first = Some(change);
-                self.lasting = self.lasting.and(tau).map(Some);
-                continue;
-            };
-            self.lasting = None;
-            let later = time.since(known.time);
-            // The order of two events at nearly one instant is decided in the general way.
-            if later.abs() <= 2.0 * time.resolution() {
-                return None;
-            }
-            if later < 0.0 {
-                *known = change;
-            }
-        }
-        let Some(change) = first else { return Some(()) };
-        // If nothing follows from it, the general way searches on.
-        let at = |i: usize| if i == change.atom { Sign::Zero } else { self.signs[i] };
-        let produce = rule.produces.iter().position(|p| p.guard.judge(at) == Truth::Yes)?;
-        self.end = Some(PredictedEnd::Event { change, produce });
+            None => None,
+        };
+        self.lasting = lasting;
         Some(())
     }
+}
+
+/// The first crossing of a life.
+#[derive(Clone, Copy)]
+pub struct FirstCrossing {
+    /// The sign that becomes zero first; None if no sign ever does.
+    pub change: Option<Change>,
+    /// See [`Prediction::lasting`].
+    pub lasting: Option<Option<f64>>,
+}
+
+/// The first crossing of a life with these signs from birth on; `meet` gives the instant at which the two sides of an atom meet.
+/// None if it has no closed form.
+#[inline]
+pub fn first_crossing(
+    watches: &[ZeroCrossing],
+    signs: &[Sign],
+    birth: SimTime,
+    mut meet: impl FnMut(usize) -> Option<PredictedCrossing>,
+) -> Option<FirstCrossing> {
+    let mut first: Option<Change> = None;
+    let mut lasting = Some(None);
+    for (atom, watch) in watches.iter().enumerate() {
+        if matches!(watch, ZeroCrossing::Search(_)) {
+            return None;
+        }
+        let Some(PredictedCrossing { time, tau, level }) = meet(atom) else { continue };
+        if time.since(birth) <= 0.0 {
+            lasting = None;
+            continue;
+        }
+        let change = Change { atom, time, at: Sign::Zero, after: opposite(signs[atom]), level };
+        let Some(known) = &mut first else {
+            first = Some(change);
+            lasting = lasting.and(tau).map(Some);
+            continue;
+        };
+        lasting = None;
+        let later = time.since(known.time);
+        // The order of two events at nearly one instant is decided in the general way.
+        if later.abs() <= 2.0 * time.resolution() {
+            return None;
+        }
+        if later < 0.0 {
+            *known = change;
+        }
+    }
+    Some(FirstCrossing { change: first, lasting })
+}
+
+/// The production that follows when a sign becomes zero while the others are as they were.
+pub fn follows(rule: &Rule, signs: &[Sign], zero: usize) -> Option<usize> {
+    let at = |i: usize| if i == zero { Sign::Zero } else { signs[i] };
+    rule.produces.iter().position(|p| p.guard.judge(at) == Truth::Yes)
 }
 
 /// Computes trajectories and event of a life of a known class again, from `life.birth` and `life.values`.
@@ -183,12 +242,18 @@ fn signs_at_birth(rule: &Rule, scratch: &mut Scratch) -> (Signs, bool) {
     let scale = own.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
     let mut clear = true;
     for side in out.chunks(2) {
-        let gap = side[0] - side[1];
-        // Not so for NaN and for infinite sides either.
-        clear &= gap.abs() > NEAR * scale.max(side[0].abs()) && gap.is_finite();
+        clear &= is_clear(side[0], side[1], scale);
         signs.push(sign_at_birth(side[0], side[1]));
     }
     (signs, clear)
+}
+
+/// True if the sides of an atom clearly differ at birth, in a module whose largest parameter, or 1, is `scale`.
+#[inline]
+pub fn is_clear(a: f64, b: f64, scale: f64) -> bool {
+    let gap = a - b;
+    // Not so for NaN and for infinite sides either.
+    gap.abs() > NEAR * scale.max(a.abs()) && gap.is_finite()
 }
 
 /// The instant at which an atom's sides meet, of a module born at an instant, if it has a closed form. The variables in
@@ -213,7 +278,20 @@ fn crossing(
     let [level] = out;
     let start = variables[variable];
     let exact = || rate_at(clause, variables, variable, level, registers, rates);
-    let tau = match reach(variable, time, level, trajectories.get(variable), start, exact)? {
+    meeting((variable, time), level, trajectories.get(variable), (birth, start), exact)
+}
+
+/// The instant at which a variable, of a module born at an instant with some value of it, takes a level. `time` is the number of
+/// `t`; `exact` as for [`reach`].
+#[inline]
+pub fn meeting(
+    (variable, time): (usize, usize),
+    level: f64,
+    trajectory: Option<&Trajectory>,
+    (birth, start): (SimTime, f64),
+    exact: impl FnOnce() -> f64,
+) -> Option<PredictedCrossing> {
+    let tau = match reach(variable, time, level, trajectory, start, exact)? {
         Reach::At(time) => return Some(PredictedCrossing { time, tau: None, level: None }),
         Reach::Age(age) => age - start,
         Reach::After(tau) => tau,

@@ -154,17 +154,98 @@ impl CalendarQueue {
                 out.push(slot);
                 continue;
             }
-            let number = slot & !RUN;
-            let recent = &mut self.recent[recent_place(time)];
-            if recent.1 == number {
-                recent.1 = NOWHERE;
-            }
-            let run = &mut self.runs[number as usize];
+            let run = self.end_run(time, slot);
             match out.is_empty() {
                 true => std::mem::swap(out, run),
                 false => out.append(run),
             }
-            self.free_runs.push(number);
+        }
+    }
+
+    /// The slots of an entry that has been taken out and is many; to be emptied.
+    fn end_run(&mut self, time: f64, slot: u32) -> &mut Vec<u32> {
+        let number = slot & !RUN;
+        let recent = &mut self.recent[recent_place(time)];
+        if recent.1 == number {
+            recent.1 = NOWHERE;
+        }
+        self.free_runs.push(number);
+        &mut self.runs[number as usize]
+    }
+
+    /// Number of entries.
+    pub fn len(&self) -> usize {
+        self.heap.len() + self.lines.iter().map(VecDeque::len).sum::<usize>()
+    }
+
+    /// Number of events before a time, counted up to a number at least.
+    pub fn count_before(&mut self, time: f64, enough: usize) -> usize {
+        self.fill_hole();
+        let events = |entry: &CalendarEntry| match entry.slot & RUN {
+            0 => 1,
+            _ => self.runs[(entry.slot & !RUN) as usize].len(),
+        };
+        let is_before = |entry: &&CalendarEntry| entry.time() < time;
+        let in_lines = self.lines.iter().flat_map(|line| line.iter().take_while(is_before).take(enough));
+        let mut count = in_lines.map(events).sum();
+        // Below an entry of the heap there is none before it.
+        let mut open = vec![0];
+        while let Some(at) = open.pop()
+            && count < enough
+        {
+            if let Some(entry) = self.heap.get(at).filter(is_before) {
+                count += events(entry);
+                open.extend(ARITY * at + 1..=ARITY * at + ARITY);
+            }
+        }
+        count
+    }
+
+    /// Takes out all events before a time, in any order.
+    pub fn take_before(&mut self, time: f64, out: &mut Vec<(f64, u32)>) {
+        self.fill_hole();
+        self.first = None;
+        let mut taken = Vec::new();
+        for (line, end) in self.lines.iter_mut().zip(&mut self.ends) {
+            while let Some(&entry) = line.front()
+                && entry.time() < time
+            {
+                line.pop_front();
+                taken.push(entry);
+            }
+            if line.is_empty() {
+                *end = f64::NEG_INFINITY;
+            }
+        }
+        // One by one, as long as these are few of all.
+        let few = self.heap.len() / 32;
+        for _ in 0..few {
+            match self.heap.first() {
+                Some(&first) if first.time() < time => taken.push(first),
+                _ => break,
+            }
+            self.hole = true;
+            self.fill_hole();
+        }
+        if self.heap.first().is_some_and(|first| first.time() < time) {
+            let is_taken = |entry: &mut CalendarEntry| entry.time() < time;
+            taken.extend(self.heap.extract_if(.., is_taken));
+            self.put_in_order();
+        }
+        for entry in taken {
+            let time = entry.time();
+            match entry.slot & RUN {
+                0 => out.push((time, entry.slot)),
+                _ => out.extend(self.end_run(time, entry.slot).drain(..).map(|slot| (time, slot))),
+            }
+        }
+    }
+
+    /// Makes a heap of the entries in it (Floyd 1964).
+    fn put_in_order(&mut self) {
+        for at in (0..self.heap.len().div_ceil(ARITY)).rev() {
+            let entry = self.heap[at];
+            self.sift_down_from(at, entry);
         }
     }
 
@@ -230,9 +311,14 @@ impl CalendarQueue {
 
     /// Puts an entry into the first place, and sets the heap in order.
     fn sift_down(&mut self, entry: CalendarEntry) {
+        self.sift_down_from(0, entry);
+    }
+
+    /// Puts an entry into a place below which all is in order.
+    #[inline]
+    fn sift_down_from(&mut self, mut at: usize, entry: CalendarEntry) {
         let heap = &mut self.heap[..];
         let wanted = entry.time();
-        let mut at = 0;
         loop {
             let first = ARITY * at + 1;
             let Some(children) = heap.get(first..(first + ARITY).min(heap.len())) else { break };
@@ -262,11 +348,24 @@ mod tests {
     proptest! {
         /// Against a sorted list; few different times, so that many meet.
         #[test]
-        fn bundles_come_in_order(steps in proptest::collection::vec((0..3u8, 0..40u32), 0..300)) {
+        fn bundles_come_in_order(steps in proptest::collection::vec((0..6u8, 0..40u32), 0..300)) {
             let mut queue = CalendarQueue::default();
             let mut list: Vec<(u32, u32)> = Vec::new();
             for (slot, (what, time)) in (0..).zip(steps) {
-                if what == 0 {
+                if what == 5 {
+                    let before = |e: &(u32, u32)| e.0 < time;
+                    let mut wanted: Vec<(f64, u32)> =
+                        list.iter().filter(|e| before(e)).map(|e| (f64::from(e.0), e.1)).collect();
+                    let enough = 3;
+                    let count = queue.count_before(f64::from(time), enough);
+                    prop_assert!(count == wanted.len() || count >= enough && wanted.len() >= enough);
+                    let mut found = Vec::new();
+                    queue.take_before(f64::from(time), &mut found);
+                    found.sort_unstable_by(|a, b| a.partial_cmp(b).expect("numbers"));
+                    wanted.sort_unstable_by(|a, b| a.partial_cmp(b).expect("numbers"));
+                    prop_assert_eq!(found, wanted);
+                    list.retain(|e| !before(e));
+                } else if what == 0 {
                     let mut out = Vec::new();
                     queue.pop(&mut out);
                     let mut found = out;

@@ -167,20 +167,14 @@ impl Schedule {
         mut instant_of: impl FnMut(&mut World, u32) -> SimTime,
     ) -> Option<(SimTime, u32)> {
         let next = self.calendar.earliest();
-        if let Some(head) = self.batch.head() {
-            if next.is_none_or(|next| next > self.batch.time) {
-                return Some(head);
-            }
-            // An event was scheduled since that is not later.
-            let Batch { time, members, passed, .. } = &mut self.batch;
-            for &slot in &members[*passed..] {
-                self.calendar.push(*time, slot);
-            }
+        if let Some(head) = self.batch.head()
+            && next.is_none_or(|next| next > self.batch.time)
+        {
+            return Some(head);
         }
+        // An event may have been scheduled since that is not later.
+        self.return_batch();
         let mut members = std::mem::take(&mut self.batch.members);
-        members.clear();
-        self.batch.instants.clear();
-        self.batch.passed = 0;
         while members.is_empty() && self.calendar.earliest().is_some() {
             self.batch.time = self.calendar.earliest().unwrap_or(f64::INFINITY);
             self.calendar.pop(&mut members);
@@ -235,6 +229,39 @@ impl Schedule {
     /// The slot of the lazy module whose event comes after the batch, if it is known without a search.
     pub fn upcoming_slot(&mut self) -> Option<u32> {
         self.calendar.earliest_slot()
+    }
+
+    /// The time of the earliest entry that is not of a lazy module; infinite if there is none.
+    pub fn earliest_other(&mut self) -> f64 {
+        self.queue.peek().map_or(f64::INFINITY, |entry| entry.at.to_f64())
+    }
+
+    /// Number of entries of lazy modules, about.
+    pub fn lazy_entries(&self) -> usize {
+        self.calendar.len()
+    }
+
+    /// True if so many lazy modules, at least, have their events before a time.
+    pub fn has_lazy_before(&mut self, time: f64, number: usize) -> bool {
+        self.return_batch();
+        self.calendar.count_before(time, number) >= number
+    }
+
+    /// Takes the lazy modules out that have their events before a time: the float of each, and its slot.
+    pub fn take_lazy_before(&mut self, time: f64, out: &mut Vec<(f64, u32)>) {
+        self.return_batch();
+        self.calendar.take_before(time, out);
+    }
+
+    /// Gives the batch back to the calendar queue.
+    fn return_batch(&mut self) {
+        let Batch { time, members, passed, instants, .. } = &mut self.batch;
+        for &slot in &members[*passed..] {
+            self.calendar.push(*time, slot);
+        }
+        members.clear();
+        instants.clear();
+        *passed = 0;
     }
 
     /// True if some entry within the resolution of `until` satisfies a condition, or is of a lazy module.

@@ -60,6 +60,7 @@ impl Trajectory {
     }
 
     /// The rate at a time since the start; NaN for dense output.
+    #[inline]
     pub fn rate(&self, tau: f64) -> f64 {
         match self {
             Trajectory::Rest => 0.0,
@@ -89,6 +90,7 @@ impl Trajectory {
 
     /// The first time after 0 at which the displacement is `u`, for trajectories that are monotonic; None for others.
     /// `rate` computes the rate there from the equation as written.
+    #[inline]
     pub fn reach(&self, u: f64, rate: impl FnOnce() -> f64) -> Option<f64> {
         match self {
             Trajectory::Polynomial([c, 0.0, 0.0, 0.0]) => {
@@ -102,6 +104,7 @@ impl Trajectory {
     }
 
     /// The time at which the solution ends, at a pole for instance; None if it does not end.
+    #[inline]
     pub fn end(&self) -> Option<f64> {
         match self {
             Trajectory::Riccati(law) => law.pole(),

@@ -219,6 +219,11 @@ impl Lives {
         Some(label)
     }
 
+    /// The labels of the classes of a rule.
+    pub fn labels_of(&self, rule: usize) -> &[u16] {
+        &self.of_rule[rule]
+    }
+
     /// Number of classes.
     pub fn len(&self) -> usize {
         self.all.len()
