@@ -91,6 +91,7 @@ fn material(soil: &Soil) -> ground::Soil {
         flow: soil.flow.unwrap_or(base.flow),
         cohesion: soil.cohesion.unwrap_or(base.cohesion),
         weight: soil.weight.unwrap_or(base.weight),
+        bearing: soil.bearing.or(base.bearing),
         swell: soil.swell.unwrap_or(base.swell),
         stick: soil.stick.unwrap_or(base.stick),
         shed: soil.shed.unwrap_or(base.shed),

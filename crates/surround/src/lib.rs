@@ -42,6 +42,7 @@ mod line;
 mod loose;
 mod marks;
 mod masses;
+mod mire;
 mod motion;
 mod obstacles;
 mod outlets;
@@ -61,6 +62,7 @@ mod terrain;
 mod tracks;
 mod trial;
 mod weather;
+mod works;
 
 pub use bending::{BentStems, Effort, Foot};
 pub use classes::{ByModes, Classes};
