@@ -12,7 +12,7 @@
 //! | friction on the sides, along the vertical | (1 - sin φ) tan φ γ z, and c | Jaky's pressure at rest, 1944 |
 //!
 //! Soil that is set in motion has a drag of (8/3) tan φ ρ |u| u for each projected area (Katsuragi, Durian, *Drag force scaling for penetration into granular media*, 2013). φ is the angle of repose,
-//! and at most 45°: what stands steeper is held by more than friction.
+//! and at most 45°: what stands steeper is held by more than friction. Where K is given, tan φ = K/35 everywhere here, at most 1: mud that stands in steep rims is no rough soil.
 //!
 //! The level is a plane through the columns around those that the body presses, as far as it is wide: a hollow that it has made does not count, its rim does. Depths are
 //! exact integrals over the triangles of the body, so they do not depend on where columns are.
@@ -26,6 +26,8 @@ use crate::resist::{Facet, Resistance};
 use crate::tile::QUANTA;
 use crate::{Ground, Soil, Vector};
 
+/// The pressure that is held, in weights of the soil above, by the tangent of the angle of repose.
+const BEARING: f64 = 35.0;
 /// Limits sideways and upward relative to that downward.
 const SIDEWAYS: f64 = 0.37;
 const UPWARD: f64 = 0.25;
@@ -41,6 +43,8 @@ const BESIDE: f64 = 1.5;
 const WIDEST: i32 = 64;
 /// Times that a step looks for the place of its middle.
 const PASSES: usize = 3;
+/// A change of the velocity, relative to it, up to which it is found.
+const NEAR: f64 = 1e-9;
 
 /// The strength of a soil.
 #[derive(Clone, Copy, Debug)]
@@ -58,11 +62,12 @@ struct Strength {
 
 impl Strength {
     fn of(soil: &Soil) -> Strength {
-        let angle = soil.repose.min(45.0).to_radians();
-        let friction = libm::tan(angle);
+        let bearing = soil.carries();
+        let friction = (bearing / BEARING).min(1.0);
+        let angle = libm::atan(friction);
         Strength {
             weight: soil.weight * 1e3,
-            bearing: soil.carries(),
+            bearing,
             cohesion: soil.cohesion * 1e3,
             friction,
             shaft: (1.0 - libm::sin(angle)) * friction,
@@ -126,7 +131,7 @@ pub struct Drive {
 impl Soil {
     /// The pressure that it holds below a body, in weights of the soil above: K of K γ z. 35 tan φ, φ at most 45°, if nothing is said.
     pub fn carries(&self) -> f64 {
-        self.bearing.unwrap_or_else(|| 35.0 * libm::tan(self.repose.min(45.0).to_radians()))
+        self.bearing.unwrap_or_else(|| BEARING * libm::tan(self.repose.min(45.0).to_radians()))
     }
 }
 
@@ -355,12 +360,13 @@ impl Bearing {
         // What lies on it has weight.
         let weight = Vector::new(0.0, -self.load * length, 0.0);
         let free = free + light * weight;
-        let (mut velocity, mut impulse) = (free, Vector::zeros());
+        // What rests stays so.
+        let (mut velocity, mut impulse) = (from.velocity, Vector::zeros());
         for _ in 0..PASSES {
-            let middle = from.position + (from.velocity + velocity) * (0.25 * length);
+            let (guess, middle) = (velocity, from.position + (from.velocity + velocity) * (0.25 * length));
             let all = self.resistance(&middle, turn);
             (velocity, impulse) = all.slow((&from.velocity, &free), light, spin, length);
-            if all.facets.is_empty() {
+            if (velocity - guess).norm() <= NEAR * (free.norm() + velocity.norm()) {
                 break;
             }
         }

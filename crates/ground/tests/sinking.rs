@@ -78,8 +78,9 @@ fn equilibrium_begins_at_the_limit() {
         ram.tick(&mut ground, &hold, 2).expect("a tick");
     }
     let depth = 0.15 - ram.stand.position.y;
-    // K γ A z + (1 - sin φ) tan φ γ 4b z²/2 = m g, φ = 45°.
-    let (k, s) = (20.0 * 3e3 * 0.04, (1.0 - 0.5_f64.sqrt()) * 3e3 * 0.8 / 2.0);
+    // K γ A z + (1 - sin φ) tan φ γ 4b z²/2 = m g, tan φ = K/35.
+    let friction = 20.0_f64 / 35.0;
+    let (k, s) = (20.0 * 3e3 * 0.04, (1.0 - friction.atan().sin()) * friction * 3e3 * 0.8 / 2.0);
     let exact = ((k * k + 4.0 * s * weight).sqrt() - k) / (2.0 * s);
     assert!((depth / exact - 1.0).abs() < 2e-3, "{depth} for {exact}");
     // A load on it is held without a motion up to the limit, and a lift meets friction only.
@@ -100,9 +101,9 @@ fn a_block_that_is_dragged_meets_earth_before_it_and_none_behind() {
     still.tick(&mut ground, &(Vector::y() * (still.mass * GRAVITY)), 1).expect("a tick");
     let all = bearing(&ground, &ram);
     let (weight, deep, width) = (3e3, 0.1, 0.2);
-    // In front 0.37 K γ w z²/2, below tan φ K γ z A, φ = 45°.
+    // In front 0.37 K γ w z²/2, below tan φ K γ z A, tan φ = K/35.
     let front = 0.37 * 20.0 * weight * width * deep * deep / 2.0;
-    let below = 20.0 * weight * deep * width * width;
+    let below = 20.0 / 35.0 * 20.0 * weight * deep * width * width;
     let exact = front + below;
     for direction in [Vector::x(), -Vector::z()] {
         let found = all.limit(&ram.stand.position, &direction);

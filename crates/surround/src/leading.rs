@@ -32,9 +32,8 @@ use crate::mire::{self, Deviation};
 use crate::paths::{INSTANTS, Path};
 use crate::tracks::{Part, Track};
 
-/// Most halvings of a tick; where soil pushes and no sheet does, this many.
+/// Most halvings of a tick.
 const DEEPEST: u32 = 14;
-const DEEPEST_IN_SOIL: u32 = 10;
 /// Most times that growth goes through a part.
 const PASSES: usize = 8;
 /// Most times that all sheets are gone through, where several push one solid.
@@ -61,6 +60,11 @@ impl Leading {
     /// With masses in kg of solids whose equations read no force, by their kinds.
     pub(crate) fn with(masses: BTreeMap<KindId, f64>) -> Leading {
         Leading { afloat: Afloat::new(masses), ..Leading::default() }
+    }
+
+    /// The inverse mass of a module that has been measured, there or as the one that it replaced.
+    pub(crate) fn known(&self, module: u64) -> Option<Matrix> {
+        self.descent.line(module).find_map(|id| self.masses.get(&id)).copied()
     }
 }
 
@@ -112,15 +116,10 @@ impl<'m> Hanging<'m> {
                     leading.descent = part.descent.clone();
                     return Ok((part, failed));
                 }
-                Err(error) if leading.level == self.deepest() => return Err(error),
+                Err(error) if leading.level == DEEPEST => return Err(error),
                 Err(_) => leading.level += 1,
             }
         }
-    }
-
-    /// Most halvings of a tick.
-    fn deepest(&self) -> u32 {
-        if self.mire.is_some() && self.hung.is_empty() { DEEPEST_IN_SOIL } else { DEEPEST }
     }
 
     /// The length of a part from a time in s on, at most as long as this: up to the next tick, also one of the soil.
@@ -448,7 +447,7 @@ fn total(forces: &[Vec<Line>], bodies: &[Body]) -> BTreeMap<u64, Line> {
 }
 
 /// How far growth under new forces is from where the sheets have the bodies: at the end of the span, with what the difference of velocities makes in as long,
-/// and on the way, in m.
+/// and on the way, in m. Of a body that is gone then, its way in the span stands for that on the way.
 fn distances(
     [view, next]: [&View; 2],
     bodies: &[Body],
@@ -460,6 +459,11 @@ fn distances(
         let (Some(path), Some(other)) = (view.paths.get(body.path), next.paths.get(body.path)) else {
             return [f64::INFINITY; 2];
         };
+        if other.is_gone {
+            // Nothing is known of where it would be, so its way is to be short.
+            between = between.max(path.place(begin).velocity.norm() * length);
+            continue;
+        }
         for (way, part) in deviation.ways.iter().zip(&INSTANTS[1..]) {
             let time = begin + length * part;
             let (here, there) = (path.place(time), other.place(time));

@@ -28,11 +28,13 @@ use crate::place::Place;
 use crate::pressing::Placed;
 use crate::works::{TICKS, Works};
 
-/// Steps in a part at first, and at most: multiples of the parts between instants.
-const FEWEST: usize = 3;
-const MOST: usize = 96;
+/// Steps from one instant of a part to the next at first, and at most.
+const FEWEST: usize = 1;
+const MOST: usize = 64;
+/// Halvings to find when a body touches soil.
+const HALVINGS: usize = 48;
 /// How near two numbers of steps have to come, in parts of what is allowed.
-const NEAR: f64 = 0.05;
+const NEAR: f64 = 0.01;
 /// A part that ends within this many seconds of a tick ends there.
 const SAME: f64 = 1e-9;
 
@@ -152,14 +154,28 @@ pub(crate) fn sink(
         let stand = path.place(begin + part * length);
         bearing.is_below(&stand.position, &stand.attitude)
     };
-    if *share == Line::default() && *others == Line::default() && !INSTANTS.into_iter().any(is_below) {
+    let touch = INSTANTS.into_iter().position(is_below);
+    if *share == Line::default() && *others == Line::default() && touch.is_none() {
         return Ok((Line::default(), Deviation::default()));
+    }
+    // A step begins where the body touches the soil, so that none goes over that.
+    let mut stops = INSTANTS.to_vec();
+    if let Some(number) = touch.filter(|number| *number > 0) {
+        let (mut low, mut high) = (INSTANTS[number - 1], INSTANTS[number]);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            (low, high) = if is_below(middle) { (low, middle) } else { (middle, high) };
+        }
+        if low > INSTANTS[number - 1] && low < INSTANTS[number] {
+            stops.insert(number, low);
+        }
     }
     let mut before: Option<Deviation> = None;
     let mut apart = f64::INFINITY;
     let mut count = FEWEST;
     while count <= MOST {
-        let (line, deviation) = steps(bearing, (body, path), (begin, length), (share, others), count);
+        let (line, deviation) =
+            steps(bearing, (body, path), (begin, length), (share, others), (&stops, count));
         if let Some(before) = before {
             let way = (deviation.ways[2] - before.ways[2]).norm();
             apart = way.max((deviation.velocity - before.velocity).norm() * length);
@@ -173,51 +189,56 @@ pub(crate) fn sink(
     Err(apart)
 }
 
-/// The same in a number of steps.
+/// The same in a number of steps from each stop, in parts of the span, to the next.
 fn steps(
     bearing: &Bearing,
     (body, path): (&Body, &Path),
     (begin, length): (f64, f64),
     (share, others): (&Line, &Line),
-    count: usize,
+    (stops, count): (&[f64], usize),
 ) -> (Line, Deviation) {
     let light = body.light;
-    let end = begin + length;
     let at = |part: f64| {
         let place = path.place(begin + part * length);
         let [impulse, integral] = others.moments(part * length);
         let position = place.position + light * integral;
         (Stand { position, velocity: place.velocity + light * impulse }, place)
     };
-    let step = length / count as f64;
     let mut deviation = Deviation::default();
     let mut way = Vector::zeros();
     // Beyond the force in the path.
     let [mut impulse, mut integral] = [Vector::zeros(); 2];
     let mut is_touched = false;
     let mut here = at(0.0).0;
-    for n in 0..count {
-        let [from, middle, to] = [0.0, 0.5, 1.0].map(|part| (n as f64 + part) / count as f64);
-        let there = at(to).0;
-        let [before, after] = [from, to].map(|part| share.moments(part * length)[0]);
-        let given = after - before;
-        let (_, place) = at(middle);
-        let velocity = here.velocity + deviation.velocity;
-        let stand = Stand { position: here.position + way, velocity };
-        let free = velocity + (there.velocity - here.velocity) - light * given;
-        let drive = Drive { turn: place.attitude, spin: place.spin, free, light };
-        let (_, push) = bearing.step(&stand, &drive, step);
-        is_touched |= push != Vector::zeros();
-        let more = push - given;
-        let faster = light * more;
-        way += (deviation.velocity + faster * 0.5) * step;
-        deviation.velocity += faster;
-        impulse += more;
-        integral += more * (end - begin - middle * length);
-        if (n + 1) % (count / 3) == 0 {
-            deviation.ways[(n + 1) / (count / 3) - 1] = way;
+    for ends in stops.windows(2) {
+        let part_of = |n: usize, half: f64| {
+            let whole = (n as f64 + half) / count as f64;
+            if whole < 1.0 { ends[0] + (ends[1] - ends[0]) * whole } else { ends[1] }
+        };
+        let step = (ends[1] - ends[0]) / count as f64 * length;
+        for n in 0..count {
+            let [from, middle, to] = [0.0, 0.5, 1.0].map(|half| part_of(n, half));
+            let there = at(to).0;
+            let [before, after] = [from, to].map(|part| share.moments(part * length)[0]);
+            let given = after - before;
+            let (_, place) = at(middle);
+            let velocity = here.velocity + deviation.velocity;
+            let stand = Stand { position: here.position + way, velocity };
+            let free = velocity + (there.velocity - here.velocity) - light * given;
+            let drive = Drive { turn: place.attitude, spin: place.spin, free, light };
+            let (_, push) = bearing.step(&stand, &drive, step);
+            is_touched |= push != Vector::zeros();
+            let more = push - given;
+            let faster = light * more;
+            way += (deviation.velocity + faster * 0.5) * step;
+            deviation.velocity += faster;
+            impulse += more;
+            integral += more * (length - middle * length);
+            here = there;
         }
-        here = there;
+        if let Some(number) = INSTANTS.into_iter().position(|instant| instant == ends[1]) {
+            deviation.ways[number - 1] = way;
+        }
     }
     // What nothing touches is under no force, exactly.
     let line = match is_touched {

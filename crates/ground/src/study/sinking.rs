@@ -166,11 +166,12 @@ pub fn released() -> Result<Vec<Convergence>, Error> {
     let (width, height, mass) = (0.2_f64, 0.4, 60.0);
     let soil = Soil { repose: 89.0, inner: 89.0, push: 0.0, cohesion: 1.0, ..Soil::mud() };
     let (weight, area) = (soil.weight * 1e3, width * width);
-    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let friction = soil.carries() / 35.0;
+    let rough = (1.0 - libm::sin(libm::atan(friction))) * friction;
     let forces = |z: f64| {
         let below = area * (soil.carries() * weight * z + 6e3);
-        let side = 4.0 * width * ((1.0 - half) * weight * z * z / 2.0 + 1e3 * z);
-        [below + side, 8.0 / 3.0 * weight / GRAVITY * area]
+        let side = 4.0 * width * (rough * weight * z * z / 2.0 + 1e3 * z);
+        [below + side, 8.0 / 3.0 * friction * weight / GRAVITY * area]
     };
     let exact = depth(mass, 0.0, 0.4, forces);
     let mut found = Vec::new();
