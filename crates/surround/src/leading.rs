@@ -43,6 +43,8 @@ const NEAR: f64 = 0.1;
 const SAME: f64 = 0.01;
 /// The next part is longer if the distance on the way is below this part of what is allowed.
 const ROOM: f64 = 0.15;
+/// A body that touches soil within this many seconds of the beginning or the end of a part does so there.
+const SOON: f64 = 1e-7;
 /// What goes on from part to part.
 #[derive(Clone, Default)]
 pub(crate) struct Leading {
@@ -52,6 +54,8 @@ pub(crate) struct Leading {
     pub(crate) descent: Descent,
     /// m of the length TICK/2^m.
     level: u32,
+    /// When the part ends at the latest, in s: where a body touches soil, so that the force begins with a part.
+    cut: Option<f64>,
     /// Solids whose equations read no force, and which sheets push all the same.
     pub(crate) afloat: Afloat,
 }
@@ -99,7 +103,9 @@ impl<'m> Hanging<'m> {
         leading: &mut Leading,
     ) -> Result<(Part, Option<Error>), Error> {
         loop {
-            let length = self.length_from(begin, TICK / f64::from(leading.level).exp2());
+            let whole = TICK / f64::from(leading.level).exp2();
+            let cut = leading.cut.take().filter(|cut| cut - begin < whole);
+            let length = cut.map_or_else(|| self.length_from(begin, whole), |cut| cut - begin);
             if self.solver.deadline.is_some_and(|deadline| Instant::now() > deadline) {
                 let span = self.model.scenery.solids.first().map(|(_, span)| *span).unwrap_or_default();
                 return Err(Error::OutOfTime { limit: f64::NAN, time: self.place.time_at(begin), span });
@@ -116,6 +122,7 @@ impl<'m> Hanging<'m> {
                     leading.descent = part.descent.clone();
                     return Ok((part, failed));
                 }
+                Err(_) if leading.cut.is_some() => (),
                 Err(error) if leading.level == DEEPEST => return Err(error),
                 Err(_) => leading.level += 1,
             }
@@ -165,6 +172,16 @@ impl<'m> Hanging<'m> {
         let mut shares = self.shares(&view, &bodies, &leading.descent);
         let borne = self.borne((&view, span.0), &bodies)?;
         let mut worst = (f64::INFINITY, 0.0);
+        let touches = bodies
+            .iter()
+            .zip(&borne.bearings)
+            .filter_map(|(body, bearing)| mire::touch(bearing.as_ref()?, &view.paths[body.path], span));
+        let touch = touches.filter(|touch| touch * span.1 > SOON).fold(f64::INFINITY, f64::min);
+        if touch < 1.0 && touch * span.1 < span.1 - SOON {
+            leading.cut = Some(span.0 + touch * span.1);
+            let fault = CouplingFault::Apart { by: f64::NAN, allowed: f64::NAN, step: span.1 };
+            return Ok(Err(self.fails(&view.paths[first].origin, span.0, fault)));
+        }
         for pass in 0..PASSES {
             let solved = match self.go_around((&view, span), (&bodies, &borne), &shares)? {
                 Ok(solved) => solved,

@@ -141,6 +141,22 @@ impl<'m> Mire<'m> {
     }
 }
 
+/// When a body on its path through a part (beginning and length, in s) is in soil first, in parts of it; `None` if it is not at any instant.
+pub(crate) fn touch(bearing: &Bearing, path: &Path, (begin, length): (f64, f64)) -> Option<f64> {
+    let is_below = |part: f64| {
+        let stand = path.place(begin + part * length);
+        bearing.is_below(&stand.position, &stand.attitude)
+    };
+    let number = INSTANTS.into_iter().position(is_below)?;
+    let mut high = INSTANTS[number];
+    let mut low = if number > 0 { INSTANTS[number - 1] } else { high };
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        (low, high) = if is_below(middle) { (low, middle) } else { (middle, high) };
+    }
+    Some(low)
+}
+
 /// What soil does to a body in a part (beginning and length, in s): its force, and how that makes the body deviate from its path. `share` is its force in the path, and
 /// `others` what sheets do beyond theirs. The inner error is the distance in m between the finest steps, where it is more than what is allowed.
 pub(crate) fn sink(
@@ -150,25 +166,14 @@ pub(crate) fn sink(
     (share, others): (&Line, &Line),
     allowed: f64,
 ) -> Result<(Line, Deviation), f64> {
-    let is_below = |part: f64| {
-        let stand = path.place(begin + part * length);
-        bearing.is_below(&stand.position, &stand.attitude)
-    };
-    let touch = INSTANTS.into_iter().position(is_below);
+    let touch = touch(bearing, path, (begin, length));
     if *share == Line::default() && *others == Line::default() && touch.is_none() {
         return Ok((Line::default(), Deviation::default()));
     }
     // A step begins where the body touches the soil, so that none goes over that.
     let mut stops = INSTANTS.to_vec();
-    if let Some(number) = touch.filter(|number| *number > 0) {
-        let (mut low, mut high) = (INSTANTS[number - 1], INSTANTS[number]);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            (low, high) = if is_below(middle) { (low, middle) } else { (middle, high) };
-        }
-        if low > INSTANTS[number - 1] && low < INSTANTS[number] {
-            stops.insert(number, low);
-        }
+    if let Some(touch) = touch.filter(|touch| !INSTANTS.contains(touch)) {
+        stops.insert(stops.partition_point(|stop| *stop < touch), touch);
     }
     let mut before: Option<Deviation> = None;
     let mut apart = f64::INFINITY;
