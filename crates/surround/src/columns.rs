@@ -73,8 +73,8 @@ pub(crate) fn grip(soil: &ground::Soil) -> dlsys_fall::Surface {
     dlsys_fall::Surface { friction: soil.slope().min(1.0), restitution: 0.0, rolling }
 }
 
-/// A soil with what it has of its base.
-fn material(soil: &Soil) -> ground::Soil {
+/// A soil with what it has of its base, in the units of the crate that follows it.
+pub fn material(soil: &Soil) -> ground::Soil {
     let base = match soil.base {
         SoilBase::Sand => ground::Soil::sand(),
         SoilBase::Mud => ground::Soil::mud(),

@@ -66,6 +66,7 @@ mod works;
 
 pub use bending::{BentStems, Effort, Foot};
 pub use classes::{ByModes, Classes};
+pub use columns::material as soil;
 pub use coupled::start;
 pub use error::{CouplingFault, Error, FailedStem, FallingPart};
 pub use gases::{Gases, MOST_BLOBS, TICK as GAS_TICK};
