@@ -114,7 +114,8 @@ impl Resistance {
                 return (at, force);
             }
             // A power that is no number ends the search, too.
-            if !(power - model > GAP * most) {
+            let gap = power - model;
+            if gap.is_nan() || gap <= GAP * most {
                 break;
             }
             cuts.push(Cut { force, offset: power - force.dot(&at) });
@@ -186,7 +187,7 @@ fn weights(cuts: &[&Cut], free: &Vector, light: &Matrix3<f64>, length: f64) -> O
     let scale = matrix.diagonal().max();
     let factored = matrix.full_piv_lu();
     let least = (0..count - 1).map(|n| factored.u()[(n, n)].abs()).fold(f64::INFINITY, f64::min);
-    if !(least > 1e-12 * scale) {
+    if least.is_nan() || scale.is_nan() || least <= 1e-12 * scale {
         return None;
     }
     let rest = factored.solve(&right)?;
