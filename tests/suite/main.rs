@@ -54,6 +54,7 @@ mod semantics;
 mod shadows;
 mod sheets;
 mod signals;
+mod sinking;
 mod small_plants;
 mod solids;
 mod strain;

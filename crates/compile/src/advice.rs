@@ -94,7 +94,8 @@ pub fn not_a_parameter(name: &Name, head: &HeadModule, variables: &Variables) ->
         return error.help("a `let` names an expression; nothing is stored that could be solved");
     }
     if let Some(quantity) = inputs::named(&name.text) {
-        let from = if quantity.is_force() { "what sheets do to the solid" } else { "the bending of stems" };
+        let from =
+            if quantity.is_force() { "what sheets and soil do to the solid" } else { "the bending of stems" };
         return error.help(format!(
             "`{}` follows from {from}; to compute one of your own, give the module a parameter of that name",
             quantity.name()

@@ -203,7 +203,7 @@ pub(super) fn check(model: &Model, inputs: &Inputs, diagnostics: &mut Vec<Diagno
     if let (Some((_, ground)), Some((quantity, other))) =
         (inputs.first(|quantity| quantity == Quantity::Ground), strain.or(force))
     {
-        let (name, what) = (quantity.name(), if quantity.is_force() { "sheets" } else { "stems" });
+        let (name, what) = (quantity.name(), if quantity.is_force() { "sheets and soil" } else { "stems" });
         diagnostics.push(
             Diagnostic::error(format!("rules read both `ground` and `{name}`"))
                 .at(ground, "the height of soil that may move")
@@ -221,20 +221,21 @@ pub(super) fn check(model: &Model, inputs: &Inputs, diagnostics: &mut Vec<Diagno
     }
     let Some((quantity, span)) = force else { return };
     let name = quantity.name();
-    if !inputs.has_sheet {
+    if !inputs.has_sheet && model.scenery.bed.is_none() {
         diagnostics.push(
-            Diagnostic::error(format!("`{name}` reads what sheets do to a solid, and there is no sheet here"))
-                .at(span, "the model declares no sheet")
-                .help("declare one, as in `sheet @Net from \"net.obj\" of rope pinned y > 2.99`, and place it: `[ @Net ]`"),
+            Diagnostic::error(format!("`{name}` reads what sheets and soil do to a solid, and there is neither here"))
+                .at(span, "the model declares no sheet, and no ground of soil")
+                .help("declare a sheet, as in `sheet @Net from \"net.obj\" of rope pinned y > 2.99`, and place it: `[ @Net ]`")
+                .help("or ground that gives way: `soil dry = sand`, `ground dry cell 0.02 extent 2`"),
         );
         return;
     }
     if let Some((_, other)) = strain {
         diagnostics.push(
             Diagnostic::error(format!("rules read both `strain` and `{name}`"))
-                .at(span, "what sheets do to a solid")
+                .at(span, "what sheets and soil do to a solid")
                 .at(other, "how a stem bends")
-                .help("growth goes on in turn with its stems or with its sheets: let the rules do without one of them, or make two models"),
+                .help("growth goes on in turn with its stems or with its sheets and soil: let the rules do without one of them, or make two models"),
         );
         return;
     }
@@ -248,8 +249,8 @@ pub(super) fn check(model: &Model, inputs: &Inputs, diagnostics: &mut Vec<Diagno
         if !is_solid && told.insert(head) {
             diagnostics.push(
                 Diagnostic::error(format!("`{kind}` is not solid, so that nothing pushes it"))
-                    .at(*span, format!("`{}` is the force of sheets on a solid", quantity.name()))
-                    .help(format!("declare that sheets meet what it draws: `solid {kind}`")),
+                    .at(*span, format!("`{}` is the force of sheets and soil on a solid", quantity.name()))
+                    .help(format!("declare that sheets and soil meet what it draws: `solid {kind}`")),
             );
         }
     }

@@ -8,6 +8,7 @@
 //! - [`Ground`]: the columns at an instant; a value, whose clones share what has not changed. [`Ground::advance`] makes the next tick.
 //! - [`Pour`]: material that is added, on a disc or everywhere.
 //! - [`Body`]: a closed mesh that presses, pushes, carries and throws up what sticks to it, or a shelf that only carries.
+//! - [`Bearing`]: what the soil does to a body that moves in it, as a force that gives way.
 //! - [`Rule`]: the law of slipping, or those of the papers for comparison.
 //! - [`Mesh`]: the surface as triangles; [`Piece`]: a part of it whose triangles stay the same at all times.
 //! - [`study`]: exact cases with their errors and orders.
@@ -67,6 +68,7 @@
 
 #![warn(missing_docs)]
 
+mod bearing;
 mod clock;
 mod coat;
 mod contour;
@@ -86,6 +88,7 @@ mod pattern;
 mod pour;
 mod press;
 mod relief;
+mod resist;
 mod rules;
 mod setup;
 mod slide;
@@ -95,6 +98,7 @@ pub mod study;
 mod tile;
 mod wedge;
 
+pub use bearing::{Bearing, Drive, Stand};
 pub use error::Error;
 pub use ground::{Description, Ground, Settings};
 pub use material::Soil;

@@ -21,8 +21,10 @@ pub struct Soil {
     pub flow: f64,
     /// Cohesion c in kPa; 0: nothing is bonded.
     pub cohesion: f64,
-    /// Specific weight γ in kN/m³. It matters for cohesive soil.
+    /// Specific weight γ in kN/m³. It matters for cohesive soil, and for bodies that the soil bears.
     pub weight: f64,
+    /// The pressure that it holds below a body, in weights of the soil above ([`Soil::carries`]); 35 times the tangent of the angle of repose if nothing is said.
+    pub bearing: Option<f64>,
     /// Relative growth of the volume of bonded soil when it comes loose, 0 to 1.
     pub swell: f64,
     /// Volume that an area of a body takes up where it touches the material, in m³/m²; 0: nothing sticks to bodies.
@@ -52,7 +54,8 @@ impl Soil {
 
     /// Mud: 1.1 rad (63.0°), 1.57 rad where pressed; 0.41 of what is pressed goes to the rim.
     pub fn mud() -> Soil {
-        Soil::of(1.1, 1.57, 0.41, 18.0)
+        // Soft mud of an undrained strength of 2 kPa holds nine times that (Skempton 1951), about five weights of what is above 0.2 m.
+        Soil { bearing: Some(5.0), ..Soil::of(1.1, 1.57, 0.41, 18.0) }
     }
 
     /// Snow that stands at any slope up to 1.57 rad and is compressed only.
@@ -77,6 +80,7 @@ impl Soil {
             flow: FLOW,
             cohesion: 0.0,
             weight,
+            bearing: None,
             swell: 0.0,
             stick: 0.0,
             shed: SHED,
@@ -85,7 +89,8 @@ impl Soil {
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let Soil { repose, inner, push, rough, flow, cohesion, weight, swell, stick, shed, grain } = *self;
+        let Soil { repose, inner, push, rough, flow, cohesion, weight, bearing, swell, stick, shed, grain } =
+            *self;
         check("an angle of repose (°)", repose, repose > 0.1 && repose <= STEEPEST, "0.1 to 89.96")?;
         let steeper = inner >= repose && inner <= STEEPEST;
         check("an inner angle of repose (°)", inner, steeper, "the angle of repose to 89.96")?;
@@ -94,6 +99,8 @@ impl Soil {
         check("a flow (m²/s)", flow, (1e-6..=1e3).contains(&flow), "1e-6 to 1000")?;
         check("a cohesion (kPa)", cohesion, (0.0..=1e4).contains(&cohesion), "0 to 10,000")?;
         check("a weight (kN/m³)", weight, weight > 0.0 && weight <= 1e3, "more than 0, at most 1000")?;
+        let bearing = bearing.unwrap_or(0.0);
+        check("a bearing", bearing, (0.0..=1e4).contains(&bearing), "0 to 10,000")?;
         check("a swelling", swell, (0.0..=1.0).contains(&swell), "0 to 1")?;
         check("what sticks to an area (m)", stick, (0.0..=1.0).contains(&stick), "0 to 1")?;
         check("a time constant of shedding (s)", shed, (1e-6..=1e6).contains(&shed), "1e-6 to 1e6")?;

@@ -34,7 +34,7 @@ pub struct Body {
 }
 
 /// Material that reaches into a body by less than this counts as touching it, in quanta; a millionth of a cell.
-const SKIN: i64 = 4096;
+pub(crate) const SKIN: i64 = 4096;
 /// Distance above the surface from which on bodies are looked at, in quanta.
 const NEAR: i64 = 8 << 32;
 /// Parts into which volumes are divided for the part that goes to the rim.

@@ -63,7 +63,7 @@ pub struct Kind {
 pub enum Quantity {
     /// `strain`: the largest bending strain of the stem that the module draws.
     Strain,
-    /// `force_x`, `force_y`, `force_z`: what sheets do to the solid that the module draws, by the axis; in kg·length/time².
+    /// `force_x`, `force_y`, `force_z`: what sheets and soil do to the solid that the module draws, by the axis; in kg·length/time².
     Force(usize),
     /// `ground(x, z)` where soil may move: the number of the heights that hold from a tick to the next one, which the field of
     /// [`Scenery::heights`](crate::Scenery::heights) has as an argument. Its slope is always 0.

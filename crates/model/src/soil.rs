@@ -27,6 +27,8 @@ pub struct Soil {
     pub cohesion: Option<f64>,
     /// Weight in kN/m³.
     pub weight: Option<f64>,
+    /// The pressure that it holds below a body, in weights of the soil above.
+    pub bearing: Option<f64>,
     /// The part by which loosened soil expands.
     pub swell: Option<f64>,
     /// What an area of a body takes up where it touches the soil, in m.

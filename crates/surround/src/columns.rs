@@ -73,8 +73,8 @@ pub(crate) fn grip(soil: &ground::Soil) -> dlsys_fall::Surface {
     dlsys_fall::Surface { friction: soil.slope().min(1.0), restitution: 0.0, rolling }
 }
 
-/// A soil with what it has of its base.
-fn material(soil: &Soil) -> ground::Soil {
+/// A soil with what it has of its base, in the units of the crate that follows it.
+pub fn material(soil: &Soil) -> ground::Soil {
     let base = match soil.base {
         SoilBase::Sand => ground::Soil::sand(),
         SoilBase::Mud => ground::Soil::mud(),
@@ -91,6 +91,7 @@ fn material(soil: &Soil) -> ground::Soil {
         flow: soil.flow.unwrap_or(base.flow),
         cohesion: soil.cohesion.unwrap_or(base.cohesion),
         weight: soil.weight.unwrap_or(base.weight),
+        bearing: soil.bearing.or(base.bearing),
         swell: soil.swell.unwrap_or(base.swell),
         stick: soil.stick.unwrap_or(base.stick),
         shed: soil.shed.unwrap_or(base.shed),

@@ -21,6 +21,11 @@ impl Descent {
         }
     }
 
+    /// Adds those of the interval that follows.
+    pub(crate) fn extend(&mut self, next: &Descent) {
+        self.0.extend(&next.0);
+    }
+
     /// The module itself, the one that it replaced, and so on, as far as this interval reaches.
     pub(crate) fn line(&self, module: u64) -> impl Iterator<Item = u64> {
         std::iter::successors(Some(module), |id| self.0.get(id).copied())

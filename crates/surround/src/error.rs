@@ -51,7 +51,7 @@ pub struct FallingPart {
     pub size: Option<f64>,
 }
 
-/// Why a solid and the sheets that push it cannot be followed.
+/// Why a solid, and the sheets and the soil that push it, cannot be followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum CouplingFault {
@@ -211,7 +211,7 @@ pub enum Error {
         span: Span,
     },
     /// Equations of motion that do not go with what the force of a sheet does to a solid.
-    #[error("`{kind}` (module {lineage}) and the sheets cannot be followed both ways at t = {}: {}", brief(*.time, 8), advice::coupling(.fault))]
+    #[error("`{kind}` (module {lineage}) and what pushes it cannot be followed both ways at t = {}: {}", brief(*.time, 8), advice::coupling(.fault))]
     Coupling {
         /// Name of the kind of the module.
         kind: String,

@@ -26,6 +26,7 @@ use dlsys_wind::Draw;
 use crate::descent::Descent;
 use crate::leading::Leading;
 use crate::line::{Exerted, Line};
+use crate::mire::Mire;
 use crate::paths::{INSTANTS, Meets, Path, Watch};
 use crate::place::Place;
 use crate::tracks::{Hung, Part, Passage, Tick, Track};
@@ -56,6 +57,8 @@ pub(crate) struct View {
     pub(crate) descent: Descent,
     /// The sheets of the string at the next tick, if they may have changed.
     next: Option<Vec<SheetPlace>>,
+    /// The strings at the beginning and at the end, where soil bears solids.
+    pub(crate) strings: [ModuleString; 2],
     pub(crate) failed: Option<Error>,
 }
 
@@ -71,6 +74,8 @@ pub(crate) struct Hanging<'m> {
     pub(crate) hung: Vec<Hanger>,
     /// Where rules read the forces on solids.
     leading: Option<Leading>,
+    /// The soil that bears them then.
+    pub(crate) mire: Option<Mire<'m>>,
     /// Parts have the ways of solids.
     notes: bool,
     /// The kinds that place sheets.
@@ -79,7 +84,7 @@ pub(crate) struct Hanging<'m> {
     chooses: bool,
     wind: Arc<Sampler<'static>>,
     pub(crate) solver: Solver,
-    scene: Scene,
+    pub(crate) scene: Scene,
 }
 
 impl<'m> Hanging<'m> {
@@ -105,6 +110,7 @@ impl<'m> Hanging<'m> {
             number: 0,
             hung,
             leading,
+            mire: None,
             notes,
             drapers,
             chooses,
@@ -114,9 +120,15 @@ impl<'m> Hanging<'m> {
         }
     }
 
+    /// The same on soil that bears solids.
+    pub(crate) fn on(self, mire: Option<Mire<'m>>) -> Hanging<'m> {
+        Hanging { mire, ..self }
+    }
+
     /// The same with solids on other ways: those of growth under no force, or, with this, under the forces of sheets. Parts have the ways of solids.
     pub(crate) fn noted(self, leading: Option<Leading>) -> Hanging<'m> {
-        Hanging { leading, notes: true, ..self }
+        let mire = self.mire.filter(|_| leading.is_some());
+        Hanging { leading, mire, notes: true, ..self }
     }
 
     /// What solids are under the forces of sheets, if they are.
@@ -137,6 +149,11 @@ impl<'m> Hanging<'m> {
     /// Points of all sheets at the tick.
     pub(crate) fn points(&self) -> usize {
         self.hung.iter().map(|hanger| hanger.hung.made.len()).sum()
+    }
+
+    /// The size of a copy: points of sheets, and columns of soil.
+    pub(crate) fn size(&self) -> usize {
+        self.points() + self.mire.as_ref().map_or(0, Mire::stored)
     }
 
     /// Seconds at the beginning of the present tick.
@@ -173,7 +190,7 @@ impl<'m> Hanging<'m> {
         let mut growth = self.growth.clone();
         let view = self.look(&mut growth, span, None)?;
         let tracks = self.solve(&view, span)?;
-        Ok(self.end(span, (view, growth), tracks, BTreeMap::new()))
+        self.end(span, (view, growth), tracks, (BTreeMap::new(), &[]))
     }
 
     /// Lets growth go on through a span (beginning and length, in s), with these forces on solids, and draws what sheets need on the way. Growth may fail there,
@@ -203,6 +220,9 @@ impl<'m> Hanging<'m> {
             }
             let around = (self.model, &self.place);
             watch.note((instant, &string), around, (&view.descent, Meets::Sheets), &mut scene)?;
+            if self.mire.is_some() && matches!(instant, 0 | 3) {
+                view.strings[instant / 3].clone_from(&string);
+            }
             if let Some(exerted) = exerted.filter(|_| instant == 0)
                 && let Err(error) = exerted.act(growth, (begin, length), &self.place)
             {
@@ -376,8 +396,8 @@ impl<'m> Hanging<'m> {
         (begin, length): (f64, f64),
         (view, growth): (View, Simulation<'m>),
         tracks: Vec<Track>,
-        forces: BTreeMap<u64, Line>,
-    ) -> (Part, Option<Error>) {
+        (forces, of_soil): (BTreeMap<u64, Line>, &[(u64, Line)]),
+    ) -> Result<(Part, Option<Error>), Error> {
         let last = |track: &Track| {
             let (_, state) = track.steps.last()?;
             let mean = |(module, line): &(u64, Line)| (*module, Line::constant(line.mean(length)));
@@ -401,6 +421,10 @@ impl<'m> Hanging<'m> {
         }
         self.hung = hung;
         self.growth = growth;
+        if let Some(mire) = self.mire.as_mut().filter(|_| view.failed.is_none()) {
+            let at_end = (&view.strings[1], begin + length);
+            mire.go_on(at_end, (&view.descent, of_soil), length, &mut self.scene)?;
+        }
         let ends = [begin, begin + length];
         let passage = |path: &Path| {
             let (origin, size) = (path.origin, 2.0 * path.shape.reach());
@@ -408,7 +432,7 @@ impl<'m> Hanging<'m> {
         };
         let passages = if self.notes { view.paths.iter().map(passage).collect() } else { Vec::new() };
         let part = Part { end: begin + length, tracks, descent: view.descent, forces, passages };
-        (part, view.failed)
+        Ok((part, view.failed))
     }
 }
 

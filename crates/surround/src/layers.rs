@@ -292,7 +292,7 @@ impl Grounded<'_> {
             self.held = [layer, Arc::clone(&self.held[0])];
             self.tick += 1;
             if goes_on {
-                self.time = terrain.time_of(self.tick);
+                self.time = terrain.works.time_of(self.tick);
             }
         }
         inputs.set_ground(self.held[0].number as f64);

@@ -1,10 +1,10 @@
-//! Sheets and solids both ways: a part of a tick is gone through until growth and the mechanics of the sheets agree on it.
+//! Sheets, soil and solids both ways: a part of a tick is gone through until growth and the mechanics of the sheets and the soil agree on it.
 //!
 //! ```text
 //!    growth under forces F ──▶ paths of the solids
 //!      ▲                          │
 //!      │                          ▼
-//!    forces, linear in time ◀── sheets, with solids that are led: on their paths, free to deviate by their mass
+//!    forces, linear in time ◀── sheets and soil, with solids that are led: on their paths, free to deviate by their mass
 //! ```
 //!
 //! Equations of motion stand in the rules of the model; of them, the mechanics gets the inverse of the mass, which is measured: growth goes on under a small force
@@ -13,8 +13,10 @@
 //! forces is the next path. A part is accepted if both agree at its end, and, within the tolerance, on the way; if they do not get there, it is halved.
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use dlsys_geometry::turtle::Origin;
+use dlsys_ground::Bearing;
 use dlsys_model::KindId;
 use dlsys_sheet::{Led, Matrix, Place as Stand, Shape, Solid, Step, Vector};
 use dlsys_sim::Simulation;
@@ -26,6 +28,7 @@ use crate::error::CouplingFault;
 use crate::hanging::{Hanger, Hanging, TICK, View};
 use crate::line::{Exerted, Line};
 use crate::masses::Body;
+use crate::mire::{self, Deviation};
 use crate::paths::{INSTANTS, Path};
 use crate::tracks::{Part, Track};
 
@@ -40,6 +43,8 @@ const NEAR: f64 = 0.1;
 const SAME: f64 = 0.01;
 /// The next part is longer if the distance on the way is below this part of what is allowed.
 const ROOM: f64 = 0.15;
+/// A body that touches soil within this many seconds of the beginning or the end of a part does so there.
+const SOON: f64 = 1e-7;
 /// What goes on from part to part.
 #[derive(Clone, Default)]
 pub(crate) struct Leading {
@@ -49,6 +54,8 @@ pub(crate) struct Leading {
     pub(crate) descent: Descent,
     /// m of the length TICK/2^m.
     level: u32,
+    /// When the part ends at the latest, in s: where a body touches soil, so that the force begins with a part.
+    cut: Option<f64>,
     /// Solids whose equations read no force, and which sheets push all the same.
     pub(crate) afloat: Afloat,
 }
@@ -58,27 +65,31 @@ impl Leading {
     pub(crate) fn with(masses: BTreeMap<KindId, f64>) -> Leading {
         Leading { afloat: Afloat::new(masses), ..Leading::default() }
     }
+
+    /// The inverse mass of a module that has been measured, there or as the one that it replaced.
+    pub(crate) fn known(&self, module: u64) -> Option<Matrix> {
+        self.descent.line(module).find_map(|id| self.masses.get(&id)).copied()
+    }
 }
 
-/// What one sheet does under forces of others: its track, its force on each body, and how that makes them deviate.
+/// What one sheet does under forces of others, or the soil: the track of a sheet, the force on each body, and how that makes them deviate.
 struct Pushed {
-    track: Track,
+    track: Option<Track>,
     forces: Vec<Line>,
     deviations: Vec<Deviation>,
 }
 
-/// How far a body is from its path at all instants but the first, and its velocity relative to it at the last one.
-#[derive(Clone, Copy, Default)]
-struct Deviation {
-    ways: [Vector; 3],
-    velocity: Vector,
-}
-
-/// All sheets of a span that agree with one another: tracks, forces by sheet and body, deviations by body.
+/// All sheets of a span, and the soil, that agree with one another: tracks of sheets, forces by what pushes (first the soil) and body, deviations by body.
 struct Solved {
     tracks: Vec<Track>,
     forces: Vec<Vec<Line>>,
     deviations: Vec<Deviation>,
+}
+
+/// A span in which soil may bear bodies: how, for each body whose rules read forces, and the distance that is allowed on the way, in m.
+struct Borne {
+    bearings: Vec<Option<Bearing>>,
+    allowed: f64,
 }
 
 /// A part that is accepted, why growth fails in it, and how far both ways are apart, in parts of what is allowed.
@@ -92,10 +103,18 @@ impl<'m> Hanging<'m> {
         leading: &mut Leading,
     ) -> Result<(Part, Option<Error>), Error> {
         loop {
-            let length = TICK / f64::from(leading.level).exp2();
+            let whole = TICK / f64::from(leading.level).exp2();
+            let cut = leading.cut.take().filter(|cut| cut - begin < whole);
+            let length = cut.map_or_else(|| self.length_from(begin, whole), |cut| cut - begin);
+            if self.solver.deadline.is_some_and(|deadline| Instant::now() > deadline) {
+                let span = self.model.scenery.solids.first().map(|(_, span)| *span).unwrap_or_default();
+                return Err(Error::OutOfTime { limit: f64::NAN, time: self.place.time_at(begin), span });
+            }
             match self.attempt((begin, length), leading)? {
                 Ok((part, failed, apart)) => {
-                    let aligned = ((begin + length - self.begin()) / (2.0 * length)).fract() == 0.0;
+                    // Ticks of soil are on a grid of their own.
+                    let aligned = self.mire.is_some()
+                        || ((begin + length - self.begin()) / (2.0 * length)).fract() == 0.0;
                     if leading.level > 0 && aligned && apart < ROOM {
                         leading.level -= 1;
                     }
@@ -103,17 +122,34 @@ impl<'m> Hanging<'m> {
                     leading.descent = part.descent.clone();
                     return Ok((part, failed));
                 }
+                Err(_) if leading.cut.is_some() => (),
                 Err(error) if leading.level == DEEPEST => return Err(error),
                 Err(_) => leading.level += 1,
             }
         }
     }
 
+    /// The length of a part from a time in s on, at most as long as this: up to the next tick, also one of the soil.
+    fn length_from(&self, begin: f64, most: f64) -> f64 {
+        let Some(mire) = &self.mire else { return most };
+        let stop = (self.begin() + TICK).min(mire.next_tick());
+        // No sliver is left over.
+        if begin + most * (1.0 + 1e-6) < stop {
+            return most;
+        }
+        let length = stop - begin;
+        [length, length.next_up(), length.next_down()]
+            .into_iter()
+            .find(|length| begin + length == stop)
+            .unwrap_or(length)
+    }
+
     /// Tries a span. The inner error is that it is too long.
     fn attempt(&mut self, span: (f64, f64), leading: &mut Leading) -> Result<Result<Accepted, Error>, Error> {
         // The forces of the part before are the first guess.
         let mut guess: BTreeMap<u64, Line> = BTreeMap::new();
-        for (module, line) in self.hung.iter().flat_map(|hanger| &hanger.forces) {
+        let in_soil = self.mire.iter().flat_map(|mire| mire.forces());
+        for (module, line) in self.hung.iter().flat_map(|hanger| &hanger.forces).chain(in_soil) {
             let sum = guess.entry(*module).or_default();
             *sum = sum.plus(line);
         }
@@ -124,7 +160,7 @@ impl<'m> Hanging<'m> {
         };
         let Some(&(first, _)) = readers.first() else {
             let tracks = self.solve(&view, span)?;
-            let (part, failed) = self.end(span, (view, growth), tracks, BTreeMap::new());
+            let (part, failed) = self.end(span, (view, growth), tracks, (BTreeMap::new(), &[]))?;
             return Ok(Ok((part, failed, 0.0)));
         };
         let mut given = {
@@ -134,21 +170,40 @@ impl<'m> Hanging<'m> {
         };
         let mut bodies = self.weigh(&readers, (&view, span), &given, (leading, false))?;
         let mut shares = self.shares(&view, &bodies, &leading.descent);
+        let borne = self.borne((&view, span.0), &bodies)?;
         let mut worst = (f64::INFINITY, 0.0);
+        let touches = bodies
+            .iter()
+            .zip(&borne.bearings)
+            .filter_map(|(body, bearing)| mire::touch(bearing.as_ref()?, &view.paths[body.path], span));
+        let touch = touches.filter(|touch| touch * span.1 > SOON).fold(f64::INFINITY, f64::min);
+        if touch < 1.0 && touch * span.1 < span.1 - SOON {
+            leading.cut = Some(span.0 + touch * span.1);
+            let fault = CouplingFault::Apart { by: f64::NAN, allowed: f64::NAN, step: span.1 };
+            return Ok(Err(self.fails(&view.paths[first].origin, span.0, fault)));
+        }
         for pass in 0..PASSES {
-            let Some(solved) = self.go_around((&view, span), &bodies, &shares)? else { break };
+            let solved = match self.go_around((&view, span), (&bodies, &borne), &shares)? {
+                Ok(solved) => solved,
+                Err(apart) => {
+                    worst = apart.unwrap_or(worst);
+                    break;
+                }
+            };
             let forces = total(&solved.forces, &bodies);
+            let of_soil = of_soil(&solved.forces, &bodies);
             if forces.is_empty() && given.is_empty() {
-                let (part, failed) = self.end(span, (view, growth), solved.tracks, forces);
+                let (part, failed) = self.end(span, (view, growth), solved.tracks, (forces, &of_soil))?;
                 return Ok(Ok((part, failed, 0.0)));
             }
             let (next_growth, next) = self.led(span, (&forces, &Descent::default()), leading)?;
-            let allowed = self.allowed(&solved.tracks);
+            let allowed = self.allowed(&solved.tracks, &borne);
             let [at_end, between] = distances([&view, &next], &bodies, &solved.deviations, span);
             let agrees = view.births.len() == next.births.len() && at_end <= NEAR * allowed;
             if agrees && between <= allowed || next.failed.is_some() {
                 let apart = at_end.max(between) / allowed;
-                let (part, failed) = self.end(span, (next, next_growth), solved.tracks, forces);
+                let (part, failed) =
+                    self.end(span, (next, next_growth), solved.tracks, (forces, &of_soil))?;
                 return Ok(Ok((part, failed, apart)));
             }
             worst = (at_end.max(between), allowed);
@@ -157,7 +212,7 @@ impl<'m> Hanging<'m> {
                 break;
             }
             (given, shares, view, growth) = (forces, solved.forces, next, next_growth);
-            shares.resize(self.hung.len() + view.births.len(), vec![Line::default(); bodies.len()]);
+            shares.resize(1 + self.hung.len() + view.births.len(), vec![Line::default(); bodies.len()]);
             if pass == 0 {
                 bodies = self.weigh(&readers, (&view, span), &given, (leading, true))?;
             }
@@ -187,46 +242,66 @@ impl<'m> Hanging<'m> {
         self.model.kinds.get(kind).reads_force() || leading.afloat.light(kind).is_some()
     }
 
-    /// The first guess of the force of each sheet on each body.
+    /// The first guess of the force of the soil, and of each sheet, on each body.
     fn shares(&self, view: &View, bodies: &[Body], since: &Descent) -> Vec<Vec<Line>> {
-        let on = |hanger: &Hanger, body: &Body| {
-            let find =
-                |id: u64| hanger.forces.iter().find(|(module, _)| *module == id).map(|(_, line)| *line);
+        let on = |forces: &[(u64, Line)], body: &Body| {
+            let find = |id: u64| forces.iter().find(|(module, _)| *module == id).map(|(_, line)| *line);
             since.line(body.module).find_map(find).unwrap_or_default()
         };
-        self.hangers(view).iter().map(|hanger| bodies.iter().map(|body| on(hanger, body)).collect()).collect()
+        let on_all = |forces: &[(u64, Line)]| bodies.iter().map(|body| on(forces, body)).collect();
+        let soil = on_all(self.mire.as_ref().map_or(&[], |mire| mire.forces()));
+        std::iter::once(soil).chain(self.hangers(view).iter().map(|hanger| on_all(&hanger.forces))).collect()
+    }
+
+    /// How soil bears the bodies whose rules read forces, in a span from a time in s on.
+    fn borne(&mut self, (view, begin): (&View, f64), bodies: &[Body]) -> Result<Borne, Error> {
+        let mut borne = Borne { bearings: bodies.iter().map(|_| None).collect(), allowed: f64::INFINITY };
+        let Some(mire) = &mut self.mire else { return Ok(borne) };
+        let reads = |body: &&Body| self.model.kinds.get(view.paths[body.path].origin.kind).reads_force();
+        let place = |body: &Body| (body.module, view.paths[body.path].place(begin).position);
+        let readers: Vec<(u64, Vector)> = bodies.iter().filter(reads).map(place).collect();
+        let mut found = mire.bearings(&view.strings[0], &readers, &mut self.scene)?.into_iter();
+        for (body, bearing) in bodies.iter().zip(&mut borne.bearings).filter(|(body, _)| reads(body)) {
+            *bearing = found.next().flatten();
+            if bearing.is_some() {
+                let size = 2.0 * view.paths[body.path].shape.reach();
+                borne.allowed = borne.allowed.min(self.solver.settings.tolerance * size);
+            }
+        }
+        Ok(borne)
     }
 
     /// The distance that is allowed on the way, in m.
-    fn allowed(&self, tracks: &[Track]) -> f64 {
+    fn allowed(&self, tracks: &[Track], borne: &Borne) -> f64 {
         let extent = |track: &Track| track.hung.made.extent();
         let pushing = tracks.iter().filter(|track| !track.forces.is_empty()).map(extent);
         let least = pushing.fold(f64::INFINITY, f64::min);
         let least = if least.is_finite() { least } else { tracks.iter().map(extent).fold(1.0, f64::min) };
-        self.solver.settings.tolerance * least
+        (self.solver.settings.tolerance * least).min(borne.allowed)
     }
 
-    /// Goes through all sheets under the forces of all others, until none changes any more. `shares` are the forces under which growth has found the paths.
-    /// `None` if they come to no end.
+    /// Goes through the soil and all sheets under the forces of all others, until none changes any more. `shares` are the forces under which growth has found the paths.
+    /// The inner error is that they come to no end, or by how much the steps in soil differ, and what is allowed.
     fn go_around(
         &mut self,
         (view, span): (&View, (f64, f64)),
-        bodies: &[Body],
+        (bodies, borne): (&[Body], &Borne),
         shares: &[Vec<Line>],
-    ) -> Result<Option<Solved>, Error> {
+    ) -> Result<Result<Solved, Option<(f64, f64)>>, Error> {
         let hangers = self.hangers(view);
         let extent = hangers.iter().map(|hanger| hanger.hung.made.extent()).fold(f64::INFINITY, f64::min);
-        let same = SAME * self.solver.settings.tolerance * extent;
+        let same = SAME * (self.solver.settings.tolerance * extent).min(borne.allowed);
         let is_same = |a: &[Line], b: &[Line]| {
             bodies.iter().zip(a.iter().zip(b)).all(|(body, (a, b))| {
                 let [impulse, integral] = a.minus(b).moments(span.1);
                 (body.light * impulse).norm() * span.1 + (body.light * integral).norm() <= same
             })
         };
-        let mut all: Vec<Option<(Pushed, Vec<Line>)>> = hangers.iter().map(|_| None).collect();
+        // The soil, and the sheets.
+        let mut all: Vec<Option<(Pushed, Vec<Line>)>> = (0..=hangers.len()).map(|_| None).collect();
         for _ in 0..ROUNDS {
             let mut changed = false;
-            for k in 0..hangers.len() {
+            for k in 0..all.len() {
                 let mut others = vec![Line::default(); bodies.len()];
                 for (j, other) in all.iter().enumerate().filter(|(j, _)| *j != k) {
                     let Some((pushed, _)) = other else { continue };
@@ -235,7 +310,13 @@ impl<'m> Hanging<'m> {
                     }
                 }
                 if !all[k].as_ref().is_some_and(|(_, then)| is_same(then, &others)) {
-                    let pushed = self.push((&hangers[k], &shares[k]), (view, span), bodies, &others)?;
+                    let pushed = match k.checked_sub(1) {
+                        Some(n) => self.push((&hangers[n], &shares[k]), (view, span), bodies, &others)?,
+                        None => match sink(view, span, (bodies, borne), [&shares[k], &others]) {
+                            Ok(pushed) => pushed,
+                            Err(apart) => return Ok(Err(Some((apart, borne.allowed)))),
+                        },
+                    };
                     all[k] = Some((pushed, others));
                     changed = true;
                 }
@@ -247,17 +328,17 @@ impl<'m> Hanging<'m> {
                     deviations: vec![Deviation::default(); bodies.len()],
                 };
                 for (Pushed { track, forces, deviations }, _) in all.into_iter().flatten() {
-                    solved.tracks.push(track);
+                    solved.tracks.extend(track);
                     solved.forces.push(forces);
                     for (sum, one) in solved.deviations.iter_mut().zip(deviations) {
                         sum.ways.iter_mut().zip(one.ways).for_each(|(sum, way)| *sum += way);
                         sum.velocity += one.velocity;
                     }
                 }
-                return Ok(Some(solved));
+                return Ok(Ok(solved));
             }
         }
-        Ok(None)
+        Ok(Err(None))
     }
 
     /// Follows a sheet through a span. `share` is its force in the paths, and `others` what other sheets do beyond theirs.
@@ -332,7 +413,7 @@ impl<'m> Hanging<'m> {
         }
         let acting = bodies.iter().zip(&forces).filter(|(_, line)| **line != Line::default());
         track.forces = acting.map(|(body, line)| (body.module, *line)).collect();
-        Ok(Pushed { track, forces, deviations })
+        Ok(Pushed { track: Some(track), forces, deviations })
     }
 
     /// A coupling that fails at a time in s.
@@ -346,7 +427,36 @@ impl<'m> Hanging<'m> {
     }
 }
 
-/// The sum of the forces of all sheets on each body, of those that are not 0.
+/// What soil does to bodies in a span. The error is by how much its steps differ, in m.
+fn sink(
+    view: &View,
+    span: (f64, f64),
+    (bodies, borne): (&[Body], &Borne),
+    [shares, others]: [&[Line]; 2],
+) -> Result<Pushed, f64> {
+    let mut pushed = Pushed { track: None, forces: Vec::new(), deviations: Vec::new() };
+    for (b, body) in bodies.iter().enumerate() {
+        let (line, deviation) = match &borne.bearings[b] {
+            Some(bearing) => {
+                let on = (body, &view.paths[body.path]);
+                mire::sink(bearing, on, span, (&shares[b], &others[b]), borne.allowed)?
+            }
+            // It has left the soil, as far as it was in it.
+            None => mire::released((body, span.1), &shares[b]),
+        };
+        pushed.forces.push(line);
+        pushed.deviations.push(deviation);
+    }
+    Ok(pushed)
+}
+
+/// The forces of the soil that are not 0, by modules.
+fn of_soil(forces: &[Vec<Line>], bodies: &[Body]) -> Vec<(u64, Line)> {
+    let all = bodies.iter().zip(forces.first().into_iter().flatten());
+    all.filter(|(_, line)| **line != Line::default()).map(|(body, line)| (body.module, *line)).collect()
+}
+
+/// The sum of the forces of all sheets and of the soil on each body, of those that are not 0.
 fn total(forces: &[Vec<Line>], bodies: &[Body]) -> BTreeMap<u64, Line> {
     let sum = |b: usize| forces.iter().fold(Line::default(), |sum, of_sheet| sum.plus(&of_sheet[b]));
     let all = bodies.iter().enumerate().map(|(b, body)| (body.module, sum(b)));
@@ -354,7 +464,7 @@ fn total(forces: &[Vec<Line>], bodies: &[Body]) -> BTreeMap<u64, Line> {
 }
 
 /// How far growth under new forces is from where the sheets have the bodies: at the end of the span, with what the difference of velocities makes in as long,
-/// and on the way, in m.
+/// and on the way, in m. Of a body that is gone then, its way in the span stands for that on the way.
 fn distances(
     [view, next]: [&View; 2],
     bodies: &[Body],
@@ -366,6 +476,11 @@ fn distances(
         let (Some(path), Some(other)) = (view.paths.get(body.path), next.paths.get(body.path)) else {
             return [f64::INFINITY; 2];
         };
+        if other.is_gone {
+            // Nothing is known of where it would be, so its way is to be short.
+            between = between.max(path.place(begin).velocity.norm() * length);
+            continue;
+        }
         for (way, part) in deviation.ways.iter().zip(&INSTANTS[1..]) {
             let time = begin + length * part;
             let (here, there) = (path.place(time), other.place(time));

@@ -39,9 +39,7 @@ impl<'m> Hanging<'m> {
         given: &BTreeMap<u64, Line>,
         (leading, again): (&mut Leading, bool),
     ) -> Result<Vec<Body>, Error> {
-        let known =
-            |module: u64| leading.descent.line(module).find_map(|id| leading.masses.get(&id)).copied();
-        let all: Option<Vec<Matrix>> = readers.iter().map(|(_, module)| known(*module)).collect();
+        let all: Option<Vec<Matrix>> = readers.iter().map(|(_, module)| leading.known(*module)).collect();
         let lights = match all.filter(|_| !again) {
             Some(all) => all,
             None => self.measure(readers, (view, span), given, leading)?,
@@ -116,14 +114,17 @@ impl<'m> Hanging<'m> {
                 }
             }
         }
+        let known = |module: u64| leading.known(module);
         let masses = readers.iter().zip(lights.iter().zip(&reads).zip(&jumps));
         masses
-            .map(|((path, _), ((light, reads), jumps))| {
+            .map(|((path, module), ((light, reads), jumps))| {
                 if let Some(light) = leading.afloat.light(view.paths[*path].origin.kind) {
                     return Ok(light);
                 }
                 let fault = || self.fails(&view.paths[*path].origin, span.0, CouplingFault::NoMass);
-                as_of_a_mass(light, reads).filter(|_| !jumps).ok_or_else(fault)
+                let found = as_of_a_mass(light, reads).filter(|_| !jumps);
+                // A production within the part, or none of a probe, is no motion by a force.
+                found.or_else(|| known(*module)).ok_or_else(fault)
             })
             .collect()
     }

@@ -51,6 +51,8 @@ pub(crate) struct Path {
     /// The module that draws it where the path begins.
     pub(crate) origin: Origin,
     pub(crate) shape: Shape,
+    /// It is not drawn at the end, or elsewhere: a production has taken its place.
+    pub(crate) is_gone: bool,
     course: Course,
 }
 
@@ -216,7 +218,7 @@ fn path(first: &Drawn, later: &[Option<Vec<Vector>>; 3], span: (f64, f64)) -> Op
     let (balls, middle, course) = course(first, later, span);
     let (points, radius) = rounded(&balls);
     let shape = Shape::rounded(points.iter().map(|point| point - middle).collect(), radius).ok()?;
-    Some(Path { origin: first.origin, shape, course })
+    Some(Path { origin: first.origin, shape, is_gone: later[2].is_none(), course })
 }
 
 /// The balls of a drawing that are corners, the middle of them, and its way.

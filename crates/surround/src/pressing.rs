@@ -37,6 +37,26 @@ impl Placed {
         }
     }
 
+    pub(crate) fn id(&self) -> u64 {
+        self.id
+    }
+
+    pub(crate) fn module(&self) -> u64 {
+        self.module
+    }
+
+    pub(crate) fn is_shelf(&self) -> bool {
+        self.is_shelf
+    }
+
+    pub(crate) fn triangles(&self) -> &Arc<[[u32; 3]]> {
+        &self.triangles
+    }
+
+    pub(crate) fn points(&self) -> &[Vector3<f64>] {
+        &self.points
+    }
+
     /// Whether it goes on as a drawing with these triangles and points: of the same shape, and not further away than it is large. What a production
     /// puts elsewhere, as a foot for its next step, has not moved through what is between.
     fn goes_on_as(&self, triangles: &[[u32; 3]], points: &[Vector3<f64>]) -> bool {

@@ -40,7 +40,7 @@ struct Shared<'m> {
 
 impl<'m> Shared<'m> {
     fn sheets(&self) -> Result<Option<&Sheets<'m>>, Error> {
-        let made = self.sheets.get_or_init(|| Sheets::new(self.model, self.settings));
+        let made = self.sheets.get_or_init(|| Sheets::and_soil(self.model, self.settings));
         made.as_ref().map(Option::as_ref).map_err(Clone::clone)
     }
 }

@@ -43,7 +43,7 @@ impl Quilt {
 impl<'m> Terrain<'m> {
     /// The times of the ticks after a time of the model, up to another one.
     pub fn ticks(&self, from: f64, to: f64) -> impl Iterator<Item = f64> {
-        let place = self.place;
+        let place = self.works.place;
         let first = (place.seconds(from).max(0.0) * TICKS).floor() as u64 + 1;
         let times = (first..).map(move |number| place.time_at(number as f64 / TICKS));
         times.skip_while(move |time| *time <= from).take_while(move |time| *time <= to)
@@ -62,7 +62,7 @@ impl<'m> Terrain<'m> {
         let earth = earth.into();
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let moment = self.reach(&mut state, until, motion)?;
-        let metre = self.place.units.length;
+        let metre = self.works.place.units.length;
         let with_mesh = |piece: ground::Piece| {
             let points = moment.ground.points(&piece);
             let triangles = piece.triangles.iter().map(|corners| (*corners, earth.surface));
@@ -95,7 +95,7 @@ impl<'m> Terrain<'m> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let moment = self.reach(&mut state, time, motion)?;
         drop(state);
-        let metre = self.place.units.length;
+        let metre = self.works.place.units.length;
         // What lies on bodies is the first owner, also where there is nothing.
         let owner = |number: usize| {
             let lineage = Lineage::of_axiom(0).child(NO_PRODUCTION, number);
@@ -117,7 +117,7 @@ impl<'m> Terrain<'m> {
             let none = ground::Mesh::default();
             add(0, Arc::new(with_spray(heaps, &none, (metre, None), quilt.earth.loose.into())), None);
         }
-        for ground::Flight { id, place, volume } in moment.ground.flights(self.place.seconds(time)) {
+        for ground::Flight { id, place, volume } in moment.ground.flights(self.works.place.seconds(time)) {
             let lineage = Lineage::of_axiom(0).child(PARTICLE, id as usize);
             let owner = scene.add_owner(Owner { name: NAME.into(), lineage });
             let axes = [Vector::x(), Vector::y(), Vector::z()];

@@ -16,6 +16,7 @@ use crate::Error;
 use crate::coupled;
 use crate::hanging::{Hanging, TICK, matched};
 use crate::marks::{Marks, Recent};
+use crate::mire::Mire;
 use crate::motion::MOST_TICKS;
 use crate::place::Place;
 use crate::tracks::Tick;
@@ -49,6 +50,17 @@ impl<'m> Sheets<'m> {
     /// # Errors
     /// A wind without meaning, or the first instant fails.
     pub fn new(model: &'m Model, settings: Settings) -> Result<Option<Sheets<'m>>, Error> {
+        if !turtle::drapes(model) {
+            return Ok(None);
+        }
+        Sheets::and_soil(model, settings)
+    }
+
+    /// The same, also if only soil pushes solids; `None` if nothing does.
+    ///
+    /// # Errors
+    /// As of [`Sheets::new`], and a ground whose values are out of range.
+    pub(crate) fn and_soil(model: &'m Model, settings: Settings) -> Result<Option<Sheets<'m>>, Error> {
         let place = Place::of_scene(&model.scenery);
         let Some(start) = first(model, settings, place)? else { return Ok(None) };
         let (past, marks) = (Recent::new(MOST_KEPT), Marks::new(MOST_MARKED));
@@ -127,7 +139,7 @@ impl<'m> Sheets<'m> {
             let tick = Arc::new(present.tick()?);
             runs.past.add(tick.number, Arc::clone(&tick), tick.size());
             if tick.failed.is_none() {
-                runs.marks.set(present.number, &present, Hanging::points);
+                runs.marks.set(present.number, &present, Hanging::size);
             }
             if let Some(error) = tick.failed.as_ref().filter(|_| tick.number < number) {
                 return Err(error.clone());
@@ -146,7 +158,9 @@ impl<'m> Sheets<'m> {
 
     /// The declaration of the first sheet.
     fn span(&self) -> Span {
-        self.model.scenery.sheets.first().map(|sheet| sheet.span).unwrap_or_default()
+        let scenery = &self.model.scenery;
+        let sheet = scenery.sheets.first().map(|sheet| sheet.span);
+        sheet.or(scenery.bed.as_ref().map(|bed| bed.span)).unwrap_or_default()
     }
 
     /// Draws a sheet: faces as one surface, cords as stems. Without a state it has the shape of its file.
@@ -200,23 +214,24 @@ fn logged(settings: Settings) -> Settings {
     Settings { log: true, transitions: false, ..settings }
 }
 
-/// The sheets of a model at the first tick; `None` if nothing places one.
+/// The sheets of a model at the first tick; `None` if nothing places one, and no soil bears solids whose rules read that.
 pub(crate) fn first<'m>(
     model: &'m Model,
     settings: Settings,
     place: Place,
 ) -> Result<Option<Hanging<'m>>, Error> {
-    if !turtle::drapes(model) {
+    let settings = logged(settings);
+    let mire = Mire::new(model, place, settings)?;
+    if !turtle::drapes(model) && mire.is_none() {
         return Ok(None);
     }
-    let settings = logged(settings);
     // Forces of sheets on solids are computed here.
     let growth = match model.reads_force() {
         true => Simulation::new(model, settings)?,
         false => coupled::start(model, settings, place)?,
     };
     let wind = Arc::new(Sampler::new(Weather::around_bodies(&model.scenery)?, place));
-    Ok(Some(Hanging::new(model, (growth, place), wind, settings.bending.tolerance)))
+    Ok(Some(Hanging::new(model, (growth, place), wind, settings.bending.tolerance).on(mire)))
 }
 
 /// The faces of a sheet as triangles.

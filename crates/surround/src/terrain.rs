@@ -12,7 +12,6 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use dlsys_diagnostic::Span;
 use dlsys_geometry::scene::{self, Scene};
 use dlsys_geometry::turtle;
 use dlsys_ground::{self as ground, Ground};
@@ -29,26 +28,23 @@ use crate::marks::{Marks, Recent};
 use crate::motion::{MOST_TICKS, Motion};
 use crate::picture::{Earth, Picture};
 use crate::place::Place;
-use crate::pressing::{Placed, placed};
+use crate::pressing::Placed;
 use crate::reading;
 use crate::spray::with_spray;
+pub use crate::works::TICKS;
+use crate::works::Works;
 
-/// Ticks of the ground in a second.
-pub const TICKS: f64 = 120.0;
 /// A time that is short of a tick by this part of one counts as the tick: a rounding of frames of 24, 30, or 60 in a second.
 const SLACK: f64 = 1e-6;
 /// Most columns of the moments that are kept because they were asked for, and of marks.
 const MOST_KEPT: usize = 4_000_000;
-/// Patches of bodies are as near to theirs as this part of a column.
-const ACCURACY: f64 = 0.1;
 /// Most times that growth goes through a tick with the ground that it reads.
 const PASSES: usize = 12;
 
 /// The ground of a model.
 pub struct Terrain<'m> {
-    model: &'m Model,
     settings: Settings,
-    pub(crate) place: Place,
+    pub(crate) works: Works<'m>,
     /// Some module may draw a body or a shelf.
     has_bodies: bool,
     /// The picture on it.
@@ -158,7 +154,8 @@ impl<'m> Terrain<'m> {
         };
         let has_bodies = !model.scenery.solids.is_empty() || !model.scenery.shelves.is_empty();
         let picture = model.scenery.bed.as_ref().and_then(|bed| Picture::of(bed, place.units.length));
-        Ok(Some(Terrain { model, settings, place, has_bodies, picture, layers, state: Mutex::new(state) }))
+        let works = Works { model, place };
+        Ok(Some(Terrain { settings, works, has_bodies, picture, layers, state: Mutex::new(state) }))
     }
 
     /// The surface of the ground and of what lies on bodies, and the particles in the air, at a time of the model, in its units, of a material. Stems move as they do here.
@@ -174,7 +171,7 @@ impl<'m> Terrain<'m> {
         let earth = earth.into();
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let moment = self.reach(&mut state, time, motion)?;
-        let (seconds, still) = (self.place.seconds(time), moment.ground.particles() == 0);
+        let (seconds, still) = (self.works.place.seconds(time), moment.ground.particles() == 0);
         let of = (moment.number, if still { 0 } else { seconds.to_bits() }, earth);
         if let Some((known, mesh)) = &state.mesh
             && *known == of
@@ -193,7 +190,7 @@ impl<'m> Terrain<'m> {
     pub fn height(&self, time: f64, [x, z]: [f64; 2], motion: Option<&Motion<'m>>) -> Result<f64, Error> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let moment = self.reach(&mut state, time, motion)?;
-        let metre = self.place.units.length;
+        let metre = self.works.place.units.length;
         Ok(moment.ground.height(x * metre, z * metre) / metre)
     }
 
@@ -225,7 +222,7 @@ impl<'m> Terrain<'m> {
         time: f64,
         motion: Option<&Motion<'m>>,
     ) -> Result<Moment, Error> {
-        let number = (self.place.seconds(time).max(0.0) * TICKS + SLACK).floor();
+        let number = (self.works.place.seconds(time).max(0.0) * TICKS + SLACK).floor();
         self.reach_tick(state, number, motion)
     }
 
@@ -259,7 +256,7 @@ impl<'m> Terrain<'m> {
 
     /// Nothing can move a ground any more.
     fn rests(&self, ground: &Ground) -> bool {
-        !self.has_bodies && self.model.scenery.pours.is_empty() && ground.is_at_rest()
+        !self.has_bodies && self.works.model.scenery.pours.is_empty() && ground.is_at_rest()
     }
 
     fn reach_tick(
@@ -271,13 +268,13 @@ impl<'m> Terrain<'m> {
         // Stems that bend have a growth of their own, which reads the ground that is computed here.
         let motion = motion.filter(|_| self.layers.is_none());
         if number > MOST_TICKS {
-            let (seconds, time) = (self.place.units.time, self.place.time_at(number / TICKS));
-            return Err(Error::TooLong { most: MOST_TICKS, time, seconds, span: self.span() });
+            let (seconds, time) = (self.works.place.units.time, self.works.place.time_at(number / TICKS));
+            return Err(Error::TooLong { most: MOST_TICKS, time, seconds, span: self.works.span() });
         }
         let begun = Instant::now();
         let (limit, spent) = (self.settings.max_seconds, state.spent);
         let in_time = |at: f64| match (spent + begun.elapsed()).as_secs_f64() > limit {
-            true => Err(Error::OutOfTime { limit, time: at, span: self.span() }),
+            true => Err(Error::OutOfTime { limit, time: at, span: self.works.span() }),
             false => Ok(()),
         };
         let moment = self.moment(state, number as u64, motion, &in_time);
@@ -299,10 +296,14 @@ impl<'m> Terrain<'m> {
             let mut course = state.start.clone();
             if self.has_bodies {
                 let mut string = ModuleString::default();
-                course.growth.at(self.time_of(0), &mut string)?;
+                course.growth.at(self.works.time_of(0), &mut string)?;
                 course.growth.take_events();
-                course.moment.bodies =
-                    Arc::new(self.bodies(&string, &[], &Descent::default(), state, motion)?);
+                course.moment.bodies = Arc::new(self.works.bodies(
+                    &string,
+                    (&[], &Descent::default()),
+                    &mut state.scene,
+                    motion,
+                )?);
             }
             (state.start, state.has_begun) = (course, true);
         }
@@ -311,7 +312,7 @@ impl<'m> Terrain<'m> {
             _ => state.marks.before(number).unwrap_or(&state.start).clone(),
         };
         while present.moment.number < number {
-            in_time(self.time_of(present.moment.number))?;
+            in_time(self.works.time_of(present.moment.number))?;
             if self.rests(&present.moment.ground) {
                 let Moment { number: from, ground, layer, .. } = &present.moment;
                 let still =
@@ -352,15 +353,16 @@ impl<'m> Terrain<'m> {
         let mut bodies = Vec::new();
         if self.has_bodies {
             let mut string = ModuleString::default();
-            course.growth.at(self.time_of(next), &mut string)?;
+            course.growth.at(self.works.time_of(next), &mut string)?;
             let mut descent = Descent::default();
-            descent.add(self.model, &course.growth.take_events());
-            bodies = self.bodies(&string, &course.moment.bodies, &descent, state, motion)?;
+            descent.add(self.works.model, &course.growth.take_events());
+            bodies =
+                self.works.bodies(&string, (&course.moment.bodies, &descent), &mut state.scene, motion)?;
         }
-        let pours = self.pours(next)?;
+        let pours = self.works.pours(next)?;
         let moving: Vec<ground::Body> = bodies.iter().map(Placed::moving).collect();
         let done = course.moment.ground.advance(&pours, &moving);
-        done.map_err(|error| self.failed(error, self.time_of(next)))?;
+        done.map_err(|error| self.works.failed(error, self.works.time_of(next)))?;
         course.moment.bodies = Arc::new(bodies);
         if let (Some(layers), Some(first)) = (&self.layers, first) {
             let span = self.span_of(course.moment.number);
@@ -378,7 +380,7 @@ impl<'m> Terrain<'m> {
         state: &mut State<'m>,
     ) -> Result<(), Error> {
         let Moment { number, ground: first, bodies: past, layer: before } = course.moment.clone();
-        let (span, pours) = (self.span_of(number), self.pours(number + 1)?);
+        let (span, pours) = (self.span_of(number), self.works.pours(number + 1)?);
         let mut layer = self.still(layers, (number, &first), before.as_ref());
         let mut guess = first.clone();
         let mut apart = 0.0;
@@ -387,18 +389,18 @@ impl<'m> Terrain<'m> {
             let mut string = ModuleString::default();
             let read = |_: &ModuleString, inputs: &mut Inputs| inputs.set_ground(layer.number as f64);
             let gone =
-                growth.give(span, read).and_then(|()| growth.at(self.time_of(number + 1), &mut string));
+                growth.give(span, read).and_then(|()| growth.at(self.works.time_of(number + 1), &mut string));
             if let Err(error) = gone {
                 state.broken = Some((number, layer));
                 return Err(error.into());
             }
             let mut descent = Descent::default();
-            descent.add(self.model, &growth.take_events());
-            let bodies = self.bodies(&string, &past, &descent, state, None)?;
+            descent.add(self.works.model, &growth.take_events());
+            let bodies = self.works.bodies(&string, (&past, &descent), &mut state.scene, None)?;
             let moving: Vec<ground::Body> = bodies.iter().map(Placed::moving).collect();
             let mut ground = first.clone();
             let done = ground.advance(&pours, &moving);
-            done.map_err(|error| self.failed(error, self.time_of(number + 1)))?;
+            done.map_err(|error| self.works.failed(error, self.works.time_of(number + 1)))?;
             apart = distance(&ground, &guess);
             if apart <= self.allowed() {
                 let bodies = Arc::new(bodies);
@@ -411,15 +413,15 @@ impl<'m> Terrain<'m> {
             layer = layers.add(span, first.clone(), Some(ground.clone()));
             guess = ground;
         }
-        let (time, allowed) = (self.time_of(number), self.allowed());
-        let metre = self.place.units.length;
-        Err(Error::GroundApart { by: apart / metre, allowed: allowed / metre, time, span: self.span() })
+        let (time, allowed) = (self.works.time_of(number), self.allowed());
+        let metre = self.works.place.units.length;
+        Err(Error::GroundApart { by: apart / metre, allowed: allowed / metre, time, span: self.works.span() })
     }
 
     /// How far the ground that growth reads may be from what comes out, in m.
     fn allowed(&self) -> f64 {
-        let cell = self.model.scenery.bed.as_ref().map_or(1.0, |bed| bed.cell);
-        self.settings.bending.tolerance * cell * self.place.units.length
+        let cell = self.works.model.scenery.bed.as_ref().map_or(1.0, |bed| bed.cell);
+        self.settings.bending.tolerance * cell * self.works.place.units.length
     }
 
     /// A layer of a ground that does not move: the one before, if that has been so.
@@ -429,7 +431,7 @@ impl<'m> Terrain<'m> {
         (number, ground): (u64, &Ground),
         before: Option<&Arc<Layer>>,
     ) -> Arc<Layer> {
-        match before.filter(|before| before.stays_at(ground) && self.model.scenery.pours.is_empty()) {
+        match before.filter(|before| before.stays_at(ground) && self.works.model.scenery.pours.is_empty()) {
             Some(before) => Arc::clone(before),
             None => layers.add(self.span_of(number), ground.clone(), None),
         }
@@ -437,100 +439,15 @@ impl<'m> Terrain<'m> {
 
     /// The time of the model at a tick, and up to the next one.
     fn span_of(&self, number: u64) -> (f64, f64) {
-        (self.time_of(number), 1.0 / (TICKS * self.place.units.time))
-    }
-
-    /// The bodies of a string, each with its place in that of the tick before.
-    fn bodies(
-        &self,
-        string: &ModuleString,
-        past: &[Placed],
-        descent: &Descent,
-        state: &mut State<'m>,
-        motion: Option<&Motion<'m>>,
-    ) -> Result<Vec<Placed>, Error> {
-        let scenery = &self.model.scenery;
-        let counts = |kind| scenery.solids.iter().chain(&scenery.shelves).any(|(own, _)| *own == kind);
-        if !string.iter().any(|module| counts(module.kind)) {
-            return Ok(Vec::new());
-        }
-        let bent = motion.map(|motion| motion.at(string)).transpose()?;
-        let strains = bent.as_ref().map(|bent| bent as &dyn turtle::Strains);
-        let cell = scenery.bed.as_ref().map_or(1.0, |bed| bed.cell);
-        let drawn = turtle::bodies(self.model, string, strains, ACCURACY * cell, &mut state.scene)?;
-        let name = |body: &turtle::DrawnBody| self.model.kinds.get(body.origin.kind).name.clone();
-        Ok(placed(drawn, past, descent, self.place.units.length, name))
-    }
-
-    /// What is poured up to a tick, at the rates and places of the middle of its time.
-    fn pours(&self, next: u64) -> Result<Vec<ground::Pour>, Error> {
-        let metre = self.place.units.length;
-        let time = self.place.time_at((next as f64 - 0.5) / TICKS);
-        let mut pours = Vec::new();
-        for (number, pour) in self.model.scenery.pours.iter().enumerate() {
-            let rate = pour.rate.eval_one(&[time]) / self.place.units.time;
-            let impossible = || Error::Pour { rate: rate * self.place.units.time, time, span: pour.span };
-            if !(rate >= 0.0 && rate.is_finite()) {
-                return Err(impossible());
-            }
-            if rate == 0.0 {
-                continue;
-            }
-            let (place, rate) = match &pour.place {
-                None => (ground::Place::Everywhere, rate * metre),
-                Some((program, radius)) => {
-                    let mut at = [f64::NAN; 3];
-                    program.eval(&[time], &mut Vec::new(), &mut at);
-                    if at.iter().any(|at| !at.is_finite()) {
-                        return Err(impossible());
-                    }
-                    let centre = [at[0] * metre, at[2] * metre];
-                    (ground::Place::Disc { centre, radius: radius * metre }, rate * metre.powi(3))
-                }
-            };
-            pours.push(ground::Pour { id: number as u64, place, rate });
-        }
-        Ok(pours)
+        (self.works.time_of(number), 1.0 / (TICKS * self.works.place.units.time))
     }
 
     /// The surface, and what is in the air at a time in s, in units of the model.
     fn mesh(&self, ground: &Ground, seconds: f64, earth: Earth) -> scene::Mesh {
-        let metre = self.place.units.length;
+        let metre = self.works.place.units.length;
         let mut surface = ground.mesh();
         surface.append(&ground.heaps());
         with_spray(surface, &ground.spray(seconds), (metre, self.picture), earth)
-    }
-
-    /// The time of the model at a tick.
-    pub(crate) fn time_of(&self, number: u64) -> f64 {
-        self.place.time_at(number as f64 / TICKS)
-    }
-
-    /// The declaration of the ground.
-    fn span(&self) -> Span {
-        self.model.scenery.bed.as_ref().map(|bed| bed.span).unwrap_or_default()
-    }
-
-    /// The failure of a ground with its place in the text: that of the body, of what is poured, or of the ground.
-    fn failed(&self, error: ground::Error, time: f64) -> Error {
-        let scenery = &self.model.scenery;
-        let name = match &error {
-            ground::Error::Open { name, .. }
-            | ground::Error::Outside { name, .. }
-            | ground::Error::Body { name, .. }
-            | ground::Error::Fast { name, .. } => Some(name.as_str()),
-            _ => None,
-        };
-        let declared = || {
-            let mut bodies = scenery.solids.iter().chain(&scenery.shelves);
-            let is_it = |name: &str| bodies.find(|(kind, _)| *self.model.kinds.get(*kind).name == *name);
-            name.and_then(is_it).map(|(_, span)| *span)
-        };
-        let poured = matches!(&error, ground::Error::Height { name, .. } if *name != "the ground")
-            || matches!(&error, ground::Error::Outside { name, .. } if name == "a pour");
-        let pour = scenery.pours.first().filter(|_| poured).map(|pour| pour.span);
-        let span = declared().or(pour).unwrap_or_else(|| self.span());
-        Error::Ground { error, time, metre: self.place.units.length, span }
     }
 }
 

@@ -8,6 +8,7 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
+use dlsys_geometry::turtle;
 use dlsys_model::{KindId, Model};
 use dlsys_sheet::{Counts, Matrix, Vector};
 use dlsys_sim::Settings;
@@ -88,6 +89,9 @@ impl<'m> Trial<'m> {
     /// A wind without meaning, or the first instant fails.
     pub fn new(model: &'m Model, settings: Settings, ways: Ways) -> Result<Option<Trial<'m>>, Error> {
         let place = Place::of_scene(&model.scenery);
+        if !turtle::drapes(model) {
+            return Ok(None);
+        }
         let Some(hanging) = sheets::first(model, settings, place)? else { return Ok(None) };
         let leading = match ways {
             Ways::Own => None,

@@ -409,6 +409,7 @@ pub static DECLARATIONS: [Declaration; 35] = [
             option("flow", Follow::Value),
             option("cohesion", Follow::Value),
             option("weight", Follow::Value),
+            option("bearing", Follow::Value),
             option("swell", Follow::Value),
             option("stick", Follow::Value),
             option("shed", Follow::Value),

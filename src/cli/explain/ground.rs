@@ -1,7 +1,7 @@
 //! Ground of soil (`ground SOIL cell …`): its columns, and whether they are followed tick by tick.
 
 use super::scene::ScenePart;
-use crate::model::{Bed, Model};
+use crate::model::{Bed, Model, Soil};
 use crate::sim::brief;
 use crate::surround::GROUND_TICKS;
 
@@ -36,6 +36,17 @@ pub fn part(model: &Model) -> Option<ScenePart> {
         count => reasons.push(format!("`pour` adds to it in {count} places")),
     }
     let has_bodies = !solids.is_empty() || !shelves.is_empty();
+    let pushed: Vec<String> = (scenery.solids.iter())
+        .filter(|(kind, _)| model.kinds.get(*kind).reads_force())
+        .map(|(kind, _)| format!("`{}`", model.kinds.get(*kind).name))
+        .collect();
+    if !pushed.is_empty() {
+        reasons.push(format!(
+            "rules of {} read the force with which it bears them, up to {} kPa in 1 m, so that growth and ground go on together",
+            pushed.join(", "),
+            brief(bearing(soil), 3)
+        ));
+    }
     let read = match model.reads_ground() {
         true if has_bodies => {
             "; rules read its height, so that growth and ground go through each tick until they agree"
@@ -57,6 +68,12 @@ pub fn part(model: &Model) -> Option<ScenePart> {
         brief(t, 6)
     );
     Some(ScenePart::new(name, "in steps", why))
+}
+
+/// The pressure in kPa that a soil holds below a body in a depth of 1 m.
+fn bearing(soil: &Soil) -> f64 {
+    let material = crate::surround::soil(soil);
+    material.carries() * material.weight + 6.0 * material.cohesion
 }
 
 fn columns(bed: &Bed) -> String {

@@ -339,7 +339,7 @@ impl Facts<'_> {
                 if let Some(quantity) = input(parameter) {
                     let (why, law) = match quantity {
                         Quantity::Force(_) => (
-                            "follows from what sheets do to the solid, at the ticks of their grid of time",
+                            "follows from what sheets and soil do to the solid, at the ticks of their grid of time",
                             "linear from tick to tick",
                         ),
                         Quantity::Strain => (

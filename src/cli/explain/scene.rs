@@ -100,7 +100,9 @@ fn solid(model: &Model) -> Option<ScenePart> {
                 false => "",
             };
             let unfelt = match lets_go(model) && model.reads_force() {
-                true => ": warning: its rules read the force of sheets, of which what falls is no part",
+                true => {
+                    ": warning: its rules read the force of sheets and soil, of which what falls is no part"
+                }
                 false => "",
             };
             let why = match (sways(model) || turtle::lets_out(model), turtle::drapes(model)) {

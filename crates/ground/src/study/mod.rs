@@ -10,6 +10,7 @@ mod presses;
 mod rules;
 mod scenes;
 mod shelves;
+mod sinking;
 mod speed;
 mod throws;
 mod vessels;
@@ -20,6 +21,7 @@ pub use presses::{ball, sphere, sphere_rim};
 pub use rules::{RuleRow, repose, rules};
 pub use scenes::{footprints, posts, runner, sandbox, torus};
 pub use shelves::{bucket, disc, square};
+pub use sinking::{Ram, dropped, fall, released};
 pub use speed::{Speed, speeds};
 pub use throws::{flight, shed};
 pub use vessels::{scoop, tip, vessel};
@@ -31,9 +33,9 @@ pub type Case = fn() -> Result<Vec<Convergence>, Error>;
 pub const SLOW_CASE: Case = cone_on_incline;
 
 /// The other exact cases.
-pub const EXACT_CASES: [Case; 15] = [
+pub const EXACT_CASES: [Case; 17] = [
     cylinder, dam, strip, cone, portions, round, disc, square, bucket, bank, sphere_rim, scoop, tip, shed,
-    flight,
+    flight, dropped, released,
 ];
 
 /// Most sweeps until a heap rests.
