@@ -304,8 +304,8 @@ impl Ground {
                 if contours.ring(to).is_some() {
                     *moved.entry(to).or_insert(0) += share;
                 } else {
-                    self.wake(to.0, to.1)?;
                     let (key, index) = self.setup.place(to.0, to.1);
+                    self.ensure(key)?;
                     self.tile_mut(key)?.loose[index] += share;
                     landed.insert(to);
                 }
@@ -315,6 +315,7 @@ impl Ground {
         for (column, volume) in moved {
             self.pack(column, volume)?;
         }
+        self.wake_all(landed.iter().copied().collect())?;
         Ok(landed)
     }
 }

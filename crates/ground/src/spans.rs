@@ -3,6 +3,8 @@
 //!
 //! Points are rounded to a lattice, and triangles are scan-converted in plan with integers, so a line meets exactly one of two triangles that share an edge.
 
+use std::ops::{Mul, RangeInclusive, Sub};
+
 use crate::tile::QUANTA;
 use crate::{Error, Vector};
 
@@ -83,27 +85,40 @@ impl Scan {
             return;
         }
         // Products of numbers below 2^30 need no wide integers.
-        let cross = if high - low < 1 << 30 && far - near < 1 << 30 { cross_of_near } else { cross };
-        let area = cross(a, b, c);
-        let ([b, c], side) = match area {
-            0 => return,
-            area if area > 0 => ([b, c], -1),
-            _ => ([c, b], 1),
-        };
-        let area = area.abs();
+        if high - low < 1 << 30 && far - near < 1 << 30 {
+            self.cover::<i64>(number, [a, b, c], rows, places);
+        } else {
+            self.cover::<i128>(number, [a, b, c], rows, places);
+        }
+    }
+
+    /// Adds what a triangle covers of a rectangle of columns, with integers that hold its area.
+    fn cover<T: Whole>(
+        &mut self,
+        number: usize,
+        [a, b, c]: [Place; 3],
+        rows: RangeInclusive<i32>,
+        places: RangeInclusive<i32>,
+    ) {
+        let (none, area) = (T::from(0), cross::<T>(a, b, c));
+        if area == none {
+            return;
+        }
+        let ([b, c], side, area) = if area > none { ([b, c], -1, area) } else { ([c, b], 1, none - area) };
         let lattice = LATTICE as i64;
         for k in rows {
             for i in places.clone() {
                 let at = Place { x: i64::from(i) * lattice, z: i64::from(k) * lattice, y: 0 };
                 let weights = [(b, c), (c, a), (a, b)].map(|(from, to)| {
-                    let weight = cross(from, to, at);
+                    let weight = cross::<T>(from, to, at);
                     let (dx, dz) = (to.x - from.x, to.z - from.z);
-                    (weight > 0 || weight == 0 && (dz > 0 || dz == 0 && dx < 0)).then_some(weight)
+                    (weight > none || weight == none && (dz > 0 || dz == 0 && dx < 0)).then_some(weight)
                 });
                 if let [Some(u), Some(v), Some(w)] = weights {
                     // Exact, so that the order of the points does not matter.
-                    let sum = u * i128::from(a.y) + v * i128::from(b.y) + w * i128::from(c.y);
-                    self.hits.push(((k, i), sum.div_euclid(area) as i64, side, number as u32));
+                    let part = |weight: T, y: i64| weight.into() * i128::from(y);
+                    let sum: i128 = part(u, a.y) + part(v, b.y) + part(w, c.y);
+                    self.hits.push(((k, i), sum.div_euclid(area.into()) as i64, side, number as u32));
                 }
             }
         }
@@ -135,14 +150,16 @@ impl Scan {
     }
 }
 
-/// Twice the area of a triangle in plan; positive if it turns from x to z.
-fn cross(a: Place, b: Place, c: Place) -> i128 {
-    i128::from(b.x - a.x) * i128::from(c.z - a.z) - i128::from(c.x - a.x) * i128::from(b.z - a.z)
-}
+/// Integers of some width.
+trait Whole: Copy + Ord + From<i64> + Into<i128> + Sub<Output = Self> + Mul<Output = Self> {}
 
-/// As [`cross`], of places within 2^30.
-fn cross_of_near(a: Place, b: Place, c: Place) -> i128 {
-    i128::from((b.x - a.x) * (c.z - a.z) - (c.x - a.x) * (b.z - a.z))
+impl Whole for i64 {}
+impl Whole for i128 {}
+
+/// Twice the area of a triangle in plan; positive if it turns from x to z. For 64 bits its points are within 2^30 of each other.
+fn cross<T: Whole>(a: Place, b: Place, c: Place) -> T {
+    let product = |x: i64, z: i64| T::from(x) * T::from(z);
+    product(b.x - a.x, c.z - a.z) - product(b.z - a.z, c.x - a.x)
 }
 
 /// Puts spans in order, and joins those of a column that touch.
@@ -237,9 +254,9 @@ pub(crate) fn carried(
     let lattice = LATTICE as i64;
     let at = Place { x: i64::from(i) * lattice + offset[0], z: i64::from(k) * lattice + offset[1], y: 0 };
     let [a, b, c] = corners.map(|(from, _)| from);
-    let sign = if cross(a, b, c) < 0 { -1 } else { 1 };
+    let sign = if cross::<i128>(a, b, c) < 0 { -1 } else { 1 };
     // A place beside the triangle moves as the nearest part of its edges, roughly.
-    let weights = [(b, c), (c, a), (a, b)].map(|(from, to)| (sign * cross(from, to, at)).max(0));
+    let weights = [(b, c), (c, a), (a, b)].map(|(from, to)| (sign * cross::<i128>(from, to, at)).max(0));
     let total = weights.iter().sum::<i128>().max(1);
     // Division rounds towards 0, so mirror images move as mirror images.
     let mean = |way: fn(&(Place, Place)) -> i64| {
