@@ -256,6 +256,30 @@ const DISH: &str = "units length 0.1, time 1\nground 0\nsolid Dish Plate Paddle\
     interpret Slats: [ f(4 + 0.2*sin(2*t)) -(90 + 8*sin(3*t)) f(-2) for i in 0 .. 4: ( [ &(90) f(0.8*i - 1.6) ^(90) !(0.15) F(4) ] ) ]\n\
     interpret Paddle(a): [ f(4.6) /(a) -(90) !(0.2) F(3) ]\n";
 
+/// The scenes of some times are the same if two threads draw them in leaps of so many, and if two of them are drawn alone.
+fn come_in_any_order(
+    session: &Session,
+    (times, straight): (&[f64], &[Scene]),
+    leap: usize,
+    alone: [usize; 2],
+) {
+    let nursery = Nursery::new(&session.model, Settings::default());
+    let strings: Vec<ModuleString> = times.iter().map(|t| string(session, *t)).collect();
+    std::thread::scope(|scope| {
+        for first in 0..2 {
+            let (nursery, strings) = (&nursery, &strings);
+            scope.spawn(move || {
+                for i in (first..strings.len()).step_by(2).map(|i| i * leap % strings.len()) {
+                    assert_eq!(places(&draw(nursery, &strings[i])), places(&straight[i]), "{i}");
+                }
+            });
+        }
+    });
+    for i in alone {
+        assert_eq!(places(&scenes(session, &times[i..=i])[0]), places(&straight[i]), "{}", times[i]);
+    }
+}
+
 #[test]
 fn the_order_of_frames_and_threads_do_not_matter_among_solids() {
     let session = read(DISH);
@@ -263,21 +287,7 @@ fn the_order_of_frames_and_threads_do_not_matter_among_solids() {
     let straight = scenes(&session, &times);
     let high = |scene: &Scene| places(scene).iter().filter(|(_, at, _)| at.y > 3.0).count();
     assert!(high(&straight[49]) > 0 && places(&straight[40]) != places(&straight[49]), "they ride on it");
-    let nursery = Nursery::new(&session.model, Settings::default());
-    let strings: Vec<ModuleString> = times.iter().map(|t| string(&session, *t)).collect();
-    std::thread::scope(|scope| {
-        for first in 0..2 {
-            let (nursery, strings, straight) = (&nursery, &strings, &straight);
-            scope.spawn(move || {
-                for i in (first..strings.len()).step_by(2).map(|i| i * 23 % strings.len()) {
-                    assert_eq!(places(&draw(nursery, &strings[i])), places(&straight[i]), "{i}");
-                }
-            });
-        }
-    });
-    for i in [11, 49] {
-        assert_eq!(places(&scenes(&session, &times[i..=i])[0]), places(&straight[i]), "{}", times[i]);
-    }
+    come_in_any_order(&session, (&times, &straight), 23, [11, 49]);
 }
 
 /// A fruit hangs within the hull of its tree, which is `solid`: it falls through it to the ground, as if the tree were not.
@@ -336,21 +346,7 @@ fn the_order_of_frames_and_threads_do_not_matter_on_soil() {
     let times: Vec<f64> = (0..20).map(|i| 1.4 + f64::from(i) * 0.161).collect();
     let straight = scenes(&session, &times);
     assert!(places(&straight[19]) != places(&straight[12]), "they move in the end");
-    let nursery = Nursery::new(&session.model, Settings::default());
-    let strings: Vec<ModuleString> = times.iter().map(|t| string(&session, *t)).collect();
-    std::thread::scope(|scope| {
-        for first in 0..2 {
-            let (nursery, strings, straight) = (&nursery, &strings, &straight);
-            scope.spawn(move || {
-                for i in (first..strings.len()).step_by(2).map(|i| i * 7 % strings.len()) {
-                    assert_eq!(places(&draw(nursery, &strings[i])), places(&straight[i]), "{i}");
-                }
-            });
-        }
-    });
-    for i in [9, 19] {
-        assert_eq!(places(&scenes(&session, &times[i..=i])[0]), places(&straight[i]), "{}", times[i]);
-    }
+    come_in_any_order(&session, (&times, &straight), 7, [9, 19]);
 }
 
 /// A solid that sheets push is where they have pushed it: a ball that drops into a cloth stays above it, and a petal that drops later lies on the ball.
