@@ -112,7 +112,8 @@ impl Interval {
 
     fn pow(self, exponent: Interval) -> Interval {
         let n = exponent.lo;
-        if exponent.lo == exponent.hi && n == n.trunc() && n.abs() < 1e6 {
+        // Whole numbers without a parity of their own do not exist: from 2^53 on all of them are even.
+        if exponent.lo == exponent.hi && n == n.trunc() && n.is_finite() {
             if n < 0.0 {
                 return Interval::binary(
                     Binary::Div,

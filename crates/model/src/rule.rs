@@ -43,6 +43,8 @@ pub struct Rule {
     pub variables: usize,
     /// Both sides of every comparison: `a` of atom i is output 2i, `b` is output 2i + 1.
     pub sides: Program,
+    /// By atom: the variables that its sides read, ascending.
+    pub atom_reads: Vec<Vec<usize>>,
     /// By variable: true if a side reads it, directly or through an aggregate.
     pub watched: Vec<bool>,
     /// The place of each atom in the text.
@@ -150,13 +152,32 @@ pub struct Solve {
     pub algebraic: Algebraic,
     /// The zero-crossing function of each atom while the clause is active.
     pub zero_crossings: Vec<ZeroCrossing>,
-    /// True if a rate may have pulses: a dependence on time that is not polynomial and may fall between two stages of a step.
-    pub has_pulses: bool,
+    /// The terms of its equations that may have pulses.
+    pub pulses: Pulses,
     /// True if the clock of an event at a rate runs under this clause and some of its equations are integrated numerically;
     /// clocks are integrated to a tolerance of their own.
     pub has_hazard_clock: bool,
     /// The components of the equations, and the variables that a step reads.
     pub stepping: Stepping,
+}
+
+/// The terms of the equations of a clause that may have pulses: that are large for a time that may fall between two stages of a step. Terms that
+/// are polynomials in what a step resolves have none.
+#[derive(Clone, Debug, Default)]
+pub struct Pulses {
+    /// The terms of rates that are integrated numerically, one output each.
+    pub rates: Program,
+    /// The terms of rates with formulas, which are integrated numerically only if all are.
+    pub formula_rates: Program,
+    /// The terms of values, one output each.
+    pub values: Program,
+}
+
+impl Pulses {
+    /// True if no term may have pulses.
+    pub fn is_empty(&self) -> bool {
+        [&self.rates, &self.formula_rates, &self.values].iter().all(|terms| terms.outputs() == 0)
+    }
 }
 
 /// A condition inside an equation. A variable replaces it there, so that the equation is smooth between the instants at

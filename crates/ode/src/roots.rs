@@ -176,7 +176,8 @@ impl<F: Function> Search<'_, F> {
         }
         let position = bracket(self.f, lo, hi, sign);
         if monotone {
-            let after = if exact == Sign::Zero { opposite(sign) } else { exact };
+            // One that ends on zero may turn back there, or rest.
+            let after = if exact == Sign::Zero { self.way_out(hi).1 } else { exact };
             return Some(Root { position, at: Sign::Zero, after });
         }
         // Too narrow to see how it gets from one side to the other: it jumps, or as good as.
@@ -376,6 +377,25 @@ mod tests {
             op(Binary::Add, op(Binary::Mul, d, d), c(1e-12))
         });
         assert_eq!(first_root(&mut miss, 0.0, 1.0, Sign::Plus, 1e-15), None);
+    }
+
+    #[test]
+    fn what_ends_on_zero_to_the_last_bit_has_not_crossed_it() {
+        // 1 - sin(x) is 0 in numbers within 1e-8 of its touch.
+        let mut f = given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, un: fn(Unary, T) -> T| {
+            op(Binary::Sub, c(1.0), un(Unary::Sin, op(Binary::Mul, c(4.0), x)))
+        });
+        let touch = first_root(&mut f, 0.0, 1.0, Sign::Plus, 1e-13).expect("a touch");
+        assert_eq!((touch.at, touch.after), (Sign::Zero, Sign::Plus), "{touch:?}");
+        // min(x, 1/2) - 1/2 rests there from the middle on, max(min(x, 1/2), x - 1/4) - 1/2 up to three quarters.
+        let mut rests = given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, _: fn(Unary, T) -> T| {
+            let rest = op(Binary::Min, x, c(0.5));
+            op(Binary::Sub, op(Binary::Max, rest, op(Binary::Sub, x, c(0.25))), c(0.5))
+        });
+        let root = first_root(&mut rests, 0.0, 1.0, Sign::Minus, 1e-15).expect("a root");
+        assert_eq!((root.position, root.at, root.after), (0.5, Sign::Zero, Sign::Zero));
+        let leaves = first_root(&mut rests, 0.5, 1.0, Sign::Zero, 1e-15).expect("a root");
+        assert!((leaves.position - 0.75).abs() < 1e-12 && leaves.after == Sign::Plus, "{leaves:?}");
     }
 
     #[test]

@@ -66,7 +66,7 @@ impl<'m> Setup<'m> {
             reads_inputs: model.reads_inputs(),
             reads_ground: model.reads_ground(),
             is_algebraic,
-            has_pulses: solves().any(|solve| solve.has_pulses),
+            has_pulses: solves().any(|solve| !solve.pulses.is_empty()),
         }
     }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use dlsys_expr::{Graph, NodeId, Program};
-use dlsys_model::{Algebraic, Jacobian, LinearRates, SolutionForm, Solve, ZeroCrossing};
+use dlsys_model::{Algebraic, Jacobian, LinearRates, Pulses, SolutionForm, Solve, ZeroCrossing};
 
 use super::crossings::crossing;
 use super::solution_forms::{classify, jacobian, linear};
@@ -27,7 +27,7 @@ pub struct ClauseAnalysis {
 
 impl ClauseAnalysis {
     /// The compiled clause.
-    pub fn compile(self, solve: DeclaredSolve, pulses: bool, layout: &VariableLayout) -> Solve {
+    pub fn compile(self, solve: DeclaredSolve, pulses: Pulses, layout: &VariableLayout) -> Solve {
         let equations = StepEquations {
             of: &self.of,
             rates: &self.rates,
@@ -53,7 +53,7 @@ impl ClauseAnalysis {
             jacobian: self.jacobian,
             algebraic: self.algebraic,
             zero_crossings: self.zero_crossings,
-            has_pulses: pulses,
+            pulses,
             has_hazard_clock: self.has_hazard_clock,
             stepping,
         }

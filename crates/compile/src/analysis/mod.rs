@@ -26,7 +26,7 @@ mod stepping;
 mod variability;
 
 use dlsys_expr::{Graph, NodeId, Program};
-use dlsys_model::{Aggregate, Jacobian, Kinds, Rule, ZeroCrossing};
+use dlsys_model::{Aggregate, Jacobian, Kinds, Pulses, Rule, ZeroCrossing};
 
 use crate::declared::ResolvedRule;
 use crate::gather::watched;
@@ -68,7 +68,7 @@ pub fn analyse(graph: &mut Graph, kinds: &Kinds, rules: Vec<ResolvedRule>) -> An
             let first = rule.declared.own();
             let context = moving.context(i).iter().enumerate();
             let moving = context.filter(|(_, moves)| **moves).map(|(v, _)| first + v).collect();
-            compile_rule(graph, rule, found, aggregates, moving, &pulses)
+            compile_rule(graph, rule, found, aggregates, moving, pulses)
         })
         .collect();
     Analysed { rules, drawn_only }
@@ -140,6 +140,14 @@ fn aggregates(graph: &mut Graph, moving: &Moving, index: usize, rule: &ResolvedR
     all
 }
 
+/// The variables that the sides of an atom read, ascending.
+fn atom_reads(sides: &Program, atom: usize) -> Vec<usize> {
+    let mut reads = [2 * atom, 2 * atom + 1].map(|side| sides.output_reads(side)).concat();
+    reads.sort_unstable();
+    reads.dedup();
+    reads
+}
+
 /// Combines the declared rule with the results of its analysis. `moving` contains the variables of the context that change.
 fn compile_rule(
     graph: &Graph,
@@ -147,7 +155,7 @@ fn compile_rule(
     found: RuleAnalysis,
     aggregates: Vec<Aggregate>,
     moving: Vec<usize>,
-    pulses: &[bool],
+    pulses: Vec<Pulses>,
 ) -> Rule {
     let layout = VariableLayout::of(&rule);
     let ResolvedRule { declared, left, right, .. } = rule;
@@ -165,6 +173,7 @@ fn compile_rule(
         left,
         right,
         right_shape: declared.right_shape,
+        atom_reads: (0..declared.atoms.len()).map(|atom| atom_reads(&sides, atom)).collect(),
         watched: watched(&sides, &aggregates, count, declared.first_aggregate),
         aggregates,
         first_aggregate: declared.first_aggregate,
@@ -172,7 +181,7 @@ fn compile_rule(
         sides,
         atoms: declared.atoms,
         boundaries: declared.boundaries,
-        solves: solves.map(|((solve, clause), pulses)| clause.compile(solve, *pulses, &layout)).collect(),
+        solves: solves.map(|((solve, clause), pulses)| clause.compile(solve, pulses, &layout)).collect(),
         produces: declared.produces,
         hidden: declared.hidden,
         clocks: declared.clocks,

@@ -4,9 +4,12 @@
 //! formulas, which may vary arbitrarily between two stages. So a rate may have pulses if it is not a polynomial in the
 //! variables that change, or reads a parameter that follows a formula. Exponential growth or decay is fast only at its
 //! beginning, where a step begins as well; a rate that is linear in it has no pulse.
+//!
+//! What is found are the terms of sums, not whole rates: in stiff equations large terms cancel each other, and bounds of their sum over a range of states tell
+//! nothing. Those of one term do.
 
-use dlsys_expr::{Graph, NodeId};
-use dlsys_model::{Kinds, Pattern, SolutionForm};
+use dlsys_expr::{Binary, Graph, Node, NodeId, Program, Unary};
+use dlsys_model::{Kinds, Pattern, Pulses, SolutionForm};
 
 use super::RuleAnalysis;
 use super::variability::Moving;
@@ -27,14 +30,14 @@ enum Pace {
 /// The parameters of a clause that follow formulas other than polynomials, with their variation.
 type Paces = Vec<(usize, Pace)>;
 
-/// By rule and clause: true if a rate may have pulses.
+/// By rule and clause: the terms that may have pulses.
 pub fn find(
     graph: &mut Graph,
     kinds: &Kinds,
     rules: &[ResolvedRule],
     found: &[RuleAnalysis],
     moving: &Moving,
-) -> Vec<Vec<bool>> {
+) -> Vec<Vec<Pulses>> {
     let clauses: Vec<Vec<Paces>> = (rules.iter().zip(found))
         .map(|(rule, found)| {
             let solves = rule.declared.solves.iter().zip(&found.clauses);
@@ -62,9 +65,7 @@ pub fn find(
         let solves = rule.declared.solves.iter().zip(&found.clauses).zip(&clauses[index]);
         pulses.push(
             solves
-                .map(|((solve, clause), own)| {
-                    surroundings.has_pulses(graph, solve, &clause.solution_forms, own)
-                })
+                .map(|((solve, clause), own)| surroundings.pulses(graph, solve, &clause.solution_forms, own))
                 .collect(),
         );
     }
@@ -83,52 +84,111 @@ struct Surroundings<'r> {
 }
 
 impl Surroundings<'_> {
-    /// True if a rate of the clause may have pulses. `paces` gives the variation of the module's own parameters.
-    fn has_pulses(
+    /// The terms of a clause that may have pulses. `paces` gives the variation of the module's own parameters.
+    fn pulses(
         &self,
         graph: &mut Graph,
         solve: &DeclaredSolve,
         solution_forms: &[SolutionForm],
         paces: &Paces,
-    ) -> bool {
+    ) -> Pulses {
         let declared = &self.rule.declared;
+        let clause = Clause { around: self, solve, paces };
+        // An aggregate may have pulses where its term may.
+        let hazy: Vec<u32> = (declared.terms().enumerate())
+            .filter(|(_, term)| clause.varies(graph, *term, true))
+            .map(|(i, _)| (declared.first_aggregate + i) as u32)
+            .collect();
+        let mut terms = |node: NodeId, by_pace: bool| -> Vec<NodeId> {
+            let mut found = summands(graph, node, &|v| clause.moves(v as usize));
+            let is_hazy = |graph: &Graph, term| graph.variables(&[term]).iter().any(|v| hazy.contains(v));
+            found.retain(|term| is_hazy(graph, *term) || clause.varies(graph, *term, by_pace));
+            found
+        };
+        let (mut rates, mut formula_rates) = (Vec::new(), Vec::new());
+        for ((_, node), form) in solve.rates.iter().zip(solution_forms) {
+            let kept = if form.is_closed() { &mut formula_rates } else { &mut rates };
+            kept.extend(terms(*node, !form.is_closed()));
+        }
+        let explicit = solve.algebraic.iter().filter(|entry| entry.explicit);
+        let values: Vec<NodeId> = explicit.flat_map(|entry| terms(entry.node, true)).collect();
+        let total = declared.variables + solve.switches.len();
+        Pulses {
+            rates: Program::compile(graph, &rates, total),
+            formula_rates: Program::compile(graph, &formula_rates, total),
+            values: Program::compile(graph, &values, total),
+        }
+    }
+}
+
+/// A clause with the variation of all that it reads.
+struct Clause<'c> {
+    around: &'c Surroundings<'c>,
+    solve: &'c DeclaredSolve,
+    /// That of the module's own parameters.
+    paces: &'c Paces,
+}
+
+impl Clause<'_> {
+    fn moves(&self, v: usize) -> bool {
+        let declared = &self.around.rule.declared;
         let (own, time) = (declared.own(), declared.time());
-        let mut nodes: Vec<NodeId> = solve.rates.iter().map(|rate| rate.1).collect();
-        nodes.extend(solve.algebraic.iter().filter(|entry| entry.explicit).map(|entry| entry.node));
-        // Terms of aggregates count as parts of the rates that read the aggregates.
-        let read = graph.variables(&nodes);
-        let summed = declared.terms().enumerate();
-        nodes.extend(
-            summed
-                .filter(|(i, _)| read.contains(&((declared.first_aggregate + i) as u32)))
-                .map(|(_, term)| term),
-        );
-        let moved = |v: usize| match v {
-            v if v < own => solve.moves(v),
-            v if v < time => self.moving[v - own],
+        match v {
+            v if v < own => self.solve.moves(v),
+            v if v < time => self.around.moving[v - own],
             // The parameters of children follow all other variables.
             v => v <= time + 1 || v >= declared.variables,
-        };
-        let pace = |v: usize| match v {
-            v if v < own => paces.iter().find(|(p, _)| *p == v).map_or(Pace::default(), |p| p.1),
-            v if v < time => self.context[v - own],
-            v if v >= declared.variables => self.children,
-            _ => Pace::default(),
-        };
-        // A rate with a formula is integrated only if all equations are.
-        let rates = solve.rates.iter().zip(solution_forms);
-        let closed: Vec<NodeId> =
-            rates.filter(|(_, form)| form.is_closed()).map(|((_, node), _)| *node).collect();
-        nodes.iter().any(|&node| {
-            let Some(all) = graph.polynomial(node, |v| moved(v as usize)) else { return true };
-            let exponential = |powers: &[(u32, u32)]| {
-                let of = powers.iter().filter(|(v, _)| pace(*v as usize) == Pace::Exponential);
-                of.map(|(_, power)| power).sum::<u32>()
-            };
-            let any = || graph.variables(&[node]).into_iter().any(|v| pace(v as usize) == Pace::Any);
-            !closed.contains(&node) && (any() || all.terms.keys().any(|powers| exponential(powers) > 1))
-        })
+        }
     }
+
+    fn pace(&self, v: usize) -> Pace {
+        let declared = &self.around.rule.declared;
+        let (own, time) = (declared.own(), declared.time());
+        match v {
+            v if v < own => self.paces.iter().find(|(p, _)| *p == v).map_or(Pace::default(), |p| p.1),
+            v if v < time => self.around.context[v - own],
+            v if v >= declared.variables => self.around.children,
+            _ => Pace::default(),
+        }
+    }
+
+    /// True if a term may have pulses: it is no polynomial of what moves or, if `by_pace`, a polynomial of what a step does not resolve.
+    fn varies(&self, graph: &mut Graph, term: NodeId, by_pace: bool) -> bool {
+        let Some(all) = graph.polynomial(term, |v| self.moves(v as usize)) else { return true };
+        let exponential = |powers: &[(u32, u32)]| {
+            let of = powers.iter().filter(|(v, _)| self.pace(*v as usize) == Pace::Exponential);
+            of.map(|(_, power)| power).sum::<u32>()
+        };
+        let any = || graph.variables(&[term]).into_iter().any(|v| self.pace(v as usize) == Pace::Any);
+        by_pace && (any() || all.terms.keys().any(|powers| exponential(powers) > 1))
+    }
+}
+
+/// The terms whose sum, up to signs, an expression is. Factors in which nothing moves are multiplied into them.
+fn summands(graph: &mut Graph, node: NodeId, moves: &dyn Fn(u32) -> bool) -> Vec<NodeId> {
+    let rests = |graph: &Graph, node| !graph.variables(&[node]).into_iter().any(moves);
+    let (mut found, mut open) = (Vec::new(), vec![(node, None)]);
+    while let Some((node, factor)) = open.pop() {
+        match graph.node(node) {
+            Node::Unary(Unary::Neg, a) => open.push((a, factor)),
+            Node::Binary(Binary::Add | Binary::Sub, a, b) => open.extend([(a, factor), (b, factor)]),
+            Node::Binary(Binary::Mul, a, b) if rests(graph, a) => {
+                let all = factor.map_or(a, |f| graph.binary(Binary::Mul, f, a));
+                open.push((b, Some(all)));
+            }
+            Node::Binary(Binary::Mul, a, b) if rests(graph, b) => {
+                let all = factor.map_or(b, |f| graph.binary(Binary::Mul, f, b));
+                open.push((a, Some(all)));
+            }
+            Node::Binary(Binary::Div, a, b) if rests(graph, b) => {
+                let one = factor.unwrap_or_else(|| graph.constant(1.0));
+                let all = graph.binary(Binary::Div, one, b);
+                open.push((a, Some(all)));
+            }
+            _ => found.push(factor.map_or(node, |f| graph.binary(Binary::Mul, f, node))),
+        }
+    }
+    found
 }
 
 fn paces(graph: &mut Graph, solve: &DeclaredSolve, solution_forms: &[SolutionForm]) -> Paces {

@@ -5,7 +5,7 @@
 //! pulses are bounded by interval arithmetic over pieces of the step, along its dense output, and compared with the
 //! rates at the stages: where the bounds are much larger, the step is cut.
 //!
-//! The analysis of the model tells which rates may have pulses ([`Solve::has_pulses`](dlsys_model::Solve::has_pulses)):
+//! The analysis of the model tells which terms of rates may have pulses ([`Pulses`](dlsys_model::Pulses)):
 //! those that are not polynomial in the variables that move, and those that read a variable with a closed form, which a
 //! step does not resolve. An integrated variable is resolved by the step to the tolerance, and a polynomial of it has
 //! no pulses.
@@ -13,16 +13,19 @@
 //! Fields ([`dlsys_expr::Field`]) are held at the middle of a piece, too: they do not vary on less than the time that they give, and steps of equations that read
 //! them are no longer than some of that ([`World::resolved`]).
 //!
-//! In stiff equations bounds over a range of states carry no information: the rates of two states a tolerance apart may
-//! differ by any amount. There the states are held at the middle of a piece, and only time and closed forms vary. Steps
-//! whose rates cannot be bounded are counted; `run --stats` and `explain` report their rules.
+//! In stiff equations bounds of a whole rate carry no information: large terms cancel each other, and the rates of two states a tolerance apart may
+//! differ by any amount. There the terms that may have pulses are bounded one by one and compared with themselves at the stages. A term may still be a steep
+//! function of a difference of two values that move together, so it is bounded by its value in the middle of a piece and its derivative along the dense
+//! output, too, in which the two rates cancel: the excess of that bound falls with the square of the piece.
+//!
+//! Steps whose rates cannot be bounded are counted; `run --stats` and `explain` report their rules.
 
 use smallvec::SmallVec;
 
 use crate::world::World;
 use crate::world::path::Path;
 use crate::world::state::State;
-use dlsys_expr::{Held, Interval, Program, Scratch};
+use dlsys_expr::{Dual, Held, Interval, Program, Scratch};
 use dlsys_model::{Rule, Solve};
 use dlsys_ode::Dense;
 use dlsys_tree::SimTime;
@@ -47,6 +50,17 @@ pub enum PulseFinding {
     Unbounded(f64),
 }
 
+impl PulseFinding {
+    /// The one of two findings that comes first in the step.
+    fn earlier(self, other: PulseFinding) -> PulseFinding {
+        let at = |finding| match finding {
+            PulseFinding::Clear => f64::INFINITY,
+            PulseFinding::Overlooked(at) | PulseFinding::Unbounded(at) => at,
+        };
+        if at(other) < at(self) { other } else { self }
+    }
+}
+
 /// A step of a module's equations that is to be examined.
 pub struct ExaminedStep<'p> {
     /// The world before the step, with the solution of the coupled modules.
@@ -67,7 +81,7 @@ pub struct ExaminedStep<'p> {
     pub own: Option<&'p Dense>,
     /// The largest contribution to the values that may be overlooked.
     pub tolerance: f64,
-    /// The equations are stiff: states are held at the middle of each piece.
+    /// The equations are stiff: their terms are examined one by one.
     pub stiff: bool,
 }
 
@@ -84,58 +98,64 @@ pub struct PulseDetector {
     held: Vec<Held>,
     held_out: Vec<Held>,
     held_scratch: Scratch<Held>,
+    along: Vec<Dual<Interval>>,
+    along_out: Vec<Dual<Interval>>,
+    along_scratch: Scratch<Dual<Interval>>,
 }
 
 impl PulseDetector {
     /// Bounds the rates of the module's equations, and its values that are solved for, along a step, and compares them
     /// with the values at the stages.
     pub fn examine(&mut self, step: &ExaminedStep) -> PulseFinding {
+        if step.stiff {
+            let (all, pulses) = (step.end.since(step.start), &step.solve.pulses);
+            let mut first = self.examine_terms(step, &pulses.rates, all);
+            if step.state.numeric_only {
+                first = first.earlier(self.examine_terms(step, &pulses.formula_rates, all));
+            }
+            return first.earlier(self.examine_terms(step, &pulses.values, 1.0));
+        }
         let all = step.end.since(step.start);
         let rates = if step.state.numeric_only { &step.solve.rates } else { &step.solve.numeric_rates };
         self.sample(step, rates, all);
         let values = &step.solve.algebraic.values;
         let explicit = values.outputs() > 0 && step.solve.algebraic.explicit.iter().all(|e| *e);
-        let mut start = step.start;
-        while step.end.since(start) > 0.0 {
-            let knot = match (&step.world.coupled, step.own) {
-                (Some(solution), None) => step.world.knot(step.state, solution, start),
-                _ => step.end,
-            };
-            let h = knot.since(start);
-            if h <= 0.0 {
-                break;
+        along(step, |path, part| {
+            let finding = self.compare(path, rates, all * part, part, step);
+            if !explicit || finding != PulseFinding::Clear {
+                return finding;
             }
-            let path = Path::of_equations(step.world, step.state, step.rule, (start, h), step.own);
-            let (before, part) = (start.since(step.start) / all, h / all);
-            let mut finding = self.compare(&path, rates, all * part, part, step);
-            if explicit && finding == PulseFinding::Clear {
-                // Bounds of the explicit values are compared with the dense output of these values.
-                let rates = std::mem::take(&mut self.seen);
-                let of = step.solve.algebraic.of.iter();
-                self.seen =
-                    of.map(|p| path.dense_bounds(*p).map_or(f64::INFINITY, Interval::magnitude)).collect();
-                finding = self.compare(&path, values, 1.0, part, step);
-                self.seen = rates;
-            }
-            match finding {
-                PulseFinding::Clear => start = knot,
-                PulseFinding::Overlooked(at) => return PulseFinding::Overlooked(before + part * at),
-                PulseFinding::Unbounded(at) => return PulseFinding::Unbounded(before + part * at),
-            }
-        }
-        PulseFinding::Clear
+            // Bounds of the explicit values are compared with the dense output of these values.
+            let rates = std::mem::take(&mut self.seen);
+            let of = step.solve.algebraic.of.iter();
+            self.seen =
+                of.map(|p| path.dense_bounds(*p).map_or(f64::INFINITY, Interval::magnitude)).collect();
+            let finding = self.compare(path, values, 1.0, part, step);
+            self.seen = rates;
+            finding
+        })
     }
 
-    /// Evaluates the rates at the stages of the method, and keeps the largest size of each.
-    fn sample(&mut self, step: &ExaminedStep, rates: &Program, all: f64) {
+    /// Bounds terms of the module's equations and compares each with its values at the stages. One that lasts for the whole step contributes `scale`
+    /// times its size to the values.
+    fn examine_terms(&mut self, step: &ExaminedStep, terms: &Program, scale: f64) -> PulseFinding {
+        if terms.outputs() == 0 {
+            return PulseFinding::Clear;
+        }
+        self.sample(step, terms, step.end.since(step.start));
+        along(step, |path, part| self.compare(path, terms, scale * part, part, step))
+    }
+
+    /// Evaluates a program at the stages of the method, and keeps the largest size of each output.
+    fn sample(&mut self, step: &ExaminedStep, program: &Program, all: f64) {
         self.seen.clear();
-        self.seen.resize(rates.outputs(), 0.0);
-        self.out.resize(rates.outputs(), 0.0);
+        self.seen.resize(program.outputs(), 0.0);
+        self.out.resize(program.outputs(), 0.0);
         for node in step.nodes {
             let at = (step.start.after(node * all), 0.0);
             let path = Path::of_equations(step.world, step.state, step.rule, at, step.own);
             path.everything_at(0.0, &mut self.values);
-            rates.eval(&self.values, &mut self.scratch, &mut self.out);
+            program.eval(&self.values, &mut self.scratch, &mut self.out);
             for (seen, value) in self.seen.iter_mut().zip(&self.out) {
                 *seen = seen.max(value.abs());
             }
@@ -152,31 +172,28 @@ impl PulseDetector {
         part: f64,
         step: &ExaminedStep,
     ) -> PulseFinding {
-        self.bounds_out.resize(program.outputs(), Interval::EMPTY);
         let mut stack: SmallVec<[(f64, f64); 16]> = SmallVec::new();
         stack.push((0.0, 1.0));
         let mut pieces = 0;
         while let Some((lo, hi)) = stack.pop() {
             pieces += 1;
-            path.everything_over(lo, hi, step.stiff, &mut self.bounds);
-            if path.world.stretch.is_finite() {
-                self.held.clear();
-                self.held.extend(self.bounds.iter().copied().map(Held));
-                self.held_out.resize(program.outputs(), Held(Interval::EMPTY));
-                program.eval(&self.held, &mut self.held_scratch, &mut self.held_out);
-                self.bounds_out.iter_mut().zip(&self.held_out).for_each(|(out, held)| *out = held.0);
-            } else {
-                program.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
-            }
-            let (mut surprising, mut bounded) = (false, true);
-            for (bounds, seen) in self.bounds_out.iter().zip(&self.seen) {
-                let size = bounds.magnitude();
-                bounded &= size.is_finite();
-                surprising |= !(size <= SURPRISE * seen || size * scale * (hi - lo) <= step.tolerance);
-            }
-            if !surprising {
+            self.bound(path, program, (lo, hi));
+            let surprises = |bounds: &[Interval], seen: &[f64]| {
+                bounds.iter().zip(seen).any(|(bounds, seen)| {
+                    let size = bounds.magnitude();
+                    !(size <= SURPRISE * seen || size * scale * (hi - lo) <= step.tolerance)
+                })
+            };
+            if !surprises(&self.bounds_out, &self.seen) {
                 continue;
             }
+            if step.stiff && !path.world.stretch.is_finite() {
+                self.tighten(path, program, (lo, hi));
+                if !surprises(&self.bounds_out, &self.seen) {
+                    continue;
+                }
+            }
+            let bounded = self.bounds_out.iter().all(|bounds| bounds.magnitude().is_finite());
             if (hi - lo) * part <= NARROW {
                 return if bounded { PulseFinding::Overlooked(lo) } else { PulseFinding::Unbounded(lo) };
             }
@@ -188,4 +205,61 @@ impl PulseDetector {
         }
         PulseFinding::Clear
     }
+
+    /// Bounds the outputs of a program over a piece of a path.
+    fn bound(&mut self, path: &Path, program: &Program, (lo, hi): (f64, f64)) {
+        self.bounds_out.resize(program.outputs(), Interval::EMPTY);
+        path.everything_over(lo, hi, &mut self.bounds);
+        if path.world.stretch.is_finite() {
+            self.held.clear();
+            self.held.extend(self.bounds.iter().copied().map(Held));
+            self.held_out.resize(program.outputs(), Held(Interval::EMPTY));
+            program.eval(&self.held, &mut self.held_scratch, &mut self.held_out);
+            self.bounds_out.iter_mut().zip(&self.held_out).for_each(|(out, held)| *out = held.0);
+        } else {
+            program.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
+        }
+    }
+
+    /// Narrows the bounds of outputs by the mean value theorem: the value in the middle, and the derivative along the path.
+    fn tighten(&mut self, path: &Path, program: &Program, (lo, hi): (f64, f64)) {
+        path.everything_along(lo, hi, &mut self.along);
+        self.along_out.resize(program.outputs(), Dual { value: Interval::EMPTY, rate: Interval::EMPTY });
+        program.eval(&self.along, &mut self.along_scratch, &mut self.along_out);
+        path.everything_at(0.5 * (lo + hi), &mut self.values);
+        self.out.resize(program.outputs(), 0.0);
+        program.eval(&self.values, &mut self.scratch, &mut self.out);
+        for ((bounds, along), middle) in self.bounds_out.iter_mut().zip(&self.along_out).zip(&self.out) {
+            let reach = 0.5 * (hi - lo) * along.rate.magnitude();
+            if !along.value.partial && !along.rate.partial && reach.is_finite() && middle.is_finite() {
+                bounds.lo = bounds.lo.max(middle - reach);
+                bounds.hi = bounds.hi.min(middle + reach);
+            }
+        }
+    }
+}
+
+/// The first finding along a step, which is gone through in pieces on which all dense output is that of one step each: `examine` gets a piece, and the part of the
+/// step that it is.
+fn along(step: &ExaminedStep, mut examine: impl FnMut(&Path, f64) -> PulseFinding) -> PulseFinding {
+    let all = step.end.since(step.start);
+    let mut start = step.start;
+    while step.end.since(start) > 0.0 {
+        let knot = match (&step.world.coupled, step.own) {
+            (Some(solution), None) => step.world.knot(step.state, solution, start),
+            _ => step.end,
+        };
+        let h = knot.since(start);
+        if h <= 0.0 {
+            break;
+        }
+        let path = Path::of_equations(step.world, step.state, step.rule, (start, h), step.own);
+        let (before, part) = (start.since(step.start) / all, h / all);
+        match examine(&path, part) {
+            PulseFinding::Clear => start = knot,
+            PulseFinding::Overlooked(at) => return PulseFinding::Overlooked(before + part * at),
+            PulseFinding::Unbounded(at) => return PulseFinding::Unbounded(before + part * at),
+        }
+    }
+    PulseFinding::Clear
 }

@@ -151,7 +151,9 @@ impl Search<'_, '_> {
     /// The first crossing or doubt of an atom from a position on.
     fn look_ahead(&mut self, atom: usize, tolerance: f64, from: f64, near: bool, decides: bool) -> Lookahead {
         let (limit, sign, error) = (self.limit, self.now[atom], self.error);
-        if self.is_integrated() && matches!(sign, Sign::Plus | Sign::Minus) {
+        // Sides that follow formulas are known to the last digits, whatever else the module reads.
+        let is_integrated = self.is_integrated() && self.path.is_integrated(&self.path.rule.atom_reads[atom]);
+        if is_integrated && matches!(sign, Sign::Plus | Sign::Minus) {
             let query = AtomQuery { atom, from, limit, sign, tolerance, near, decides, error };
             return self.detector.look(self.path, query);
         }

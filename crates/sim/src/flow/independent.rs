@@ -237,7 +237,7 @@ impl FlowStage<'_, '_> {
         let fixed = self.setup.settings.method.is_fixed_step();
         let settings = self.setup.settings.for_clocks(solve.has_hazard_clock);
         let stiff = control.stiff || self.setup.settings.method.is_implicit();
-        let pulses = solve.has_pulses && !fixed;
+        let pulses = !solve.pulses.is_empty() && !fixed;
         let least = 64.0 * from.resolution();
         let mut tries = 0;
         let step = loop {

@@ -2,7 +2,8 @@
 //! p = 1 + shape Richards), with constant coefficients.
 //!
 //! A substitution makes both linear. With `y = ln(x / x(0))`, or `y = (x / x(0))^(1-p) - 1`, it is `y' = f + d y` from
-//! `y = 0`, so that growth from 1e-300 and small displacements keep their digits.
+//! `y = 0`, so that growth from 1e-300 and small displacements keep their digits. Where x grows by a large factor towards a limit, `y` comes near -1, and
+//! `z = 1 + y` has the digits: it is `exp(d s) + g (exp(d s) - 1)/d`, with `g = f - d = (1-p) b x(0)^(p-1)`, two terms of one sign.
 
 use dlsys_expr::{Dual, Interval};
 
@@ -14,8 +15,29 @@ pub struct Growth {
     /// Rate of y at the start.
     f: f64,
     d: f64,
+    /// f - d, of Bernoulli's equation.
+    g: f64,
     /// 1 - p; None for Gompertz's law.
     bend: Option<f64>,
+}
+
+/// Where a solution of Bernoulli's equation is: y, and z = 1 + y.
+#[derive(Clone, Copy)]
+struct Place {
+    y: f64,
+    z: f64,
+}
+
+impl Place {
+    /// True where y has more digits than z.
+    fn is_near_start(self) -> bool {
+        self.y > -0.5
+    }
+
+    /// ln(z)
+    fn logarithm(self) -> f64 {
+        if self.is_near_start() { self.y.ln_1p() } else { self.z.ln() }
+    }
 }
 
 /// The greatest logarithm of a number.
@@ -24,13 +46,17 @@ const LARGEST: f64 = 709.782_712_893_384;
 impl Growth {
     /// The solution of `x' = x (a + b ln x)` from `x`; None where the closed form does not hold, as for `x` ≤ 0.
     pub fn gompertz(x: f64, a: f64, b: f64) -> Option<Growth> {
-        Growth { x, f: a + b * x.ln(), d: b, bend: None }.checked()
+        Growth { x, f: a + b * x.ln(), d: b, g: 0.0, bend: None }.checked()
     }
 
-    /// The solution of `x' = a x + b x^p` from `x`; None where the closed form does not hold, as for `x` ≤ 0 or p = 1.
+    /// The solution of `x' = a x + b x^p` from `x`; None where the closed form does not hold, as for `x` ≤ 0 or p = 1, or `b x^p` is too small for a number.
     pub fn bernoulli(x: f64, a: f64, b: f64, p: f64) -> Option<Growth> {
         let bend = 1.0 - p;
-        Growth { x, f: bend * (a + b * x.powf(p - 1.0)), d: bend * a, bend: Some(bend) }.checked()
+        let power = b * x.powf(p - 1.0);
+        if b != 0.0 && !power.is_normal() {
+            return None;
+        }
+        Growth { x, f: bend * (a + power), d: bend * a, g: bend * power, bend: Some(bend) }.checked()
     }
 
     fn checked(self) -> Option<Growth> {
@@ -38,47 +64,63 @@ impl Growth {
         good.then_some(self)
     }
 
-    fn y(&self, s: f64) -> f64 {
-        if self.d == 0.0 { self.f * s } else { self.f * ((self.d * s).exp_m1() / self.d) }
+    /// The integral of `exp(d s)`.
+    fn spread(&self, s: f64) -> f64 {
+        if self.d == 0.0 { s } else { (self.d * s).exp_m1() / self.d }
     }
 
-    /// ln(x / x(0)) as a function of y.
-    fn logarithm(&self, y: f64) -> f64 {
-        self.bend.map_or(y, |bend| y.ln_1p() / bend)
+    /// ln(x / x(0)) at a time; NaN beyond the end of the solution.
+    fn logarithm(&self, s: f64) -> f64 {
+        let spread = self.spread(s);
+        let y = self.f * spread;
+        let Some(bend) = self.bend else { return y };
+        let z = if y.is_finite() { (self.d * s).exp() + self.g * spread } else { y };
+        if z < 0.0 { f64::NAN } else { Place { y, z }.logarithm() / bend }
     }
 
     /// The displacement at a time since the start, which may be negative. NaN or infinite beyond the end of the
     /// solution.
     pub fn value(&self, s: f64) -> f64 {
-        if self.f == 0.0 || s == 0.0 {
-            return 0.0;
-        }
-        let y = self.y(s);
-        if self.bend.is_some() && y < -1.0 {
-            return f64::NAN;
-        }
-        self.x * self.logarithm(y).exp_m1()
+        if self.f == 0.0 || s == 0.0 { 0.0 } else { self.x * self.logarithm(s).exp_m1() }
     }
 
     /// The rate where the displacement is `u`.
     pub fn rate(&self, u: f64) -> f64 {
-        let y = self.y_of(u);
         let size = self.x + u;
+        let place = self.place_of(u);
         match self.bend {
-            None => size * (self.f + self.d * y),
-            // d ln x = dy / (bend (1 + y))
-            Some(bend) => size * (self.f + self.d * y) / (bend * (1.0 + y)),
+            None => size * (self.f + self.d * place.y),
+            // d ln x = dy / (bend z)
+            Some(bend) => size * self.slope(place) / (bend * place.z),
         }
     }
 
-    fn y_of(&self, u: f64) -> f64 {
-        let logarithm = (u / self.x).ln_1p();
-        self.bend.map_or(logarithm, |bend| (bend * logarithm).exp_m1())
+    /// y' = f + d y = g + d z
+    fn slope(&self, place: Place) -> f64 {
+        if place.is_near_start() || self.bend.is_none() {
+            self.f + self.d * place.y
+        } else {
+            self.g + self.d * place.z
+        }
     }
 
-    /// The time at which y has a value; None if it never has.
-    fn time_of(&self, y: f64) -> Option<f64> {
-        let s = if self.d == 0.0 { y / self.f } else { (self.d * (y / self.f)).ln_1p() / self.d };
+    fn place_of(&self, u: f64) -> Place {
+        let logarithm = (u / self.x).ln_1p();
+        match self.bend {
+            None => Place { y: logarithm, z: f64::NAN },
+            Some(bend) => Place { y: (bend * logarithm).exp_m1(), z: (bend * logarithm).exp() },
+        }
+    }
+
+    /// The time at which the solution is at a place; None if it never is.
+    fn time_of(&self, place: Place) -> Option<f64> {
+        let s = if self.d == 0.0 {
+            place.y / self.f
+        } else if place.is_near_start() || self.bend.is_none() {
+            (self.d * (place.y / self.f)).ln_1p() / self.d
+        } else {
+            (self.slope(place) / self.f).ln() / self.d
+        };
         s.is_finite().then_some(s)
     }
 
@@ -87,7 +129,7 @@ impl Growth {
         if self.f == 0.0 || u <= -self.x && self.bend.is_none_or(|bend| bend <= 0.0) {
             return None;
         }
-        self.time_of(self.y_of(u))
+        self.time_of(self.place_of(u))
     }
 
     /// The times, before and after 0, at which the solution ends.
@@ -96,9 +138,12 @@ impl Growth {
             return (None, None);
         }
         let largest = LARGEST - self.x.ln().max(0.0);
-        let above = self.bend.map_or(largest, |bend| (bend * largest).exp_m1());
-        let ends =
-            [Some(above), self.bend.map(|_| -1.0)].into_iter().flatten().filter_map(|y| self.time_of(y));
+        let above = match self.bend {
+            None => Place { y: largest, z: f64::NAN },
+            Some(bend) => Place { y: (bend * largest).exp_m1(), z: (bend * largest).exp() },
+        };
+        let nothing = self.bend.map(|_| Place { y: -1.0, z: 0.0 });
+        let ends = [Some(above), nothing].into_iter().flatten().filter_map(|place| self.time_of(place));
         let (mut before, mut after): (Option<f64>, Option<f64>) = (None, None);
         for s in ends {
             if s > 0.0 {
@@ -118,15 +163,15 @@ impl Growth {
         }
         let mut rate = Interval::spanned(self.rate(a), self.rate(b));
         // The rate has one extreme, where d(ln x')/ds = 0: (f + d y) + d = 0 for Gompertz; for Bernoulli where
-        // (1 + y) d = (f + d y)(1 - 1/bend).
+        // z d = (g + d z)(1 - 1/bend).
         let extreme = match self.bend {
             None => -(self.f + self.d) / self.d,
             Some(bend) => {
                 let part = 1.0 - 1.0 / bend;
-                (self.f * part - self.d) / (self.d * (1.0 - part))
+                (self.g * part / (self.d * (1.0 - part))).ln() / bend
             }
         };
-        let u = self.x * self.logarithm(extreme).exp_m1();
+        let u = self.x * extreme.exp_m1();
         if a.min(b) < u && u < a.max(b) {
             let there = self.rate(u);
             rate = Interval { lo: rate.lo.min(there), hi: rate.hi.max(there), ..rate };
@@ -164,6 +209,35 @@ mod tests {
         assert!(
             Growth::gompertz(0.0, 1.0, 1.0).is_none() && Growth::bernoulli(-1.0, 1.0, 1.0, 0.5).is_none()
         );
+    }
+
+    #[test]
+    fn growth_by_many_decades_ends_at_its_limit() {
+        // x' = a x (1 - (x/k)^n) has the solution k (1 + ((k/x0)^n - 1) exp(-n a s))^(-1/n).
+        for (x, k, n) in [
+            (0.0886f64, 75.8, 5.0),
+            (0.01, 100.0, 4.0),
+            (1e-6, 100.0, 2.0),
+            (1e-9, 1e3, 1.5),
+            (1e-20, 1.0, 3.0),
+        ] {
+            let a = 4.9;
+            let law = Growth::bernoulli(x, a, -a * f64::powf(k, -n), n + 1.0).expect("a solution");
+            assert_eq!(law.ends().1, None, "{x} {k} {n}");
+            for s in [0.1, 1.0, 2.0, 4.0, 9.0, 30.0, 200.0] {
+                let rest = ((n * (k / x).ln()).exp_m1().ln() - n * a * s).exp();
+                let exact = k * (rest.ln_1p() / -n).exp();
+                let found = x + law.value(s);
+                assert!(close(found, exact, 1e-12), "{found}, not {exact}, from {x} to {k}, {n} at {s}");
+                let rate = a * exact * (1.0 - (exact / k).powf(n));
+                assert!((law.rate(law.value(s)) - rate).abs() <= 1e-12 * a * k, "{rate} at {s}");
+                if exact < 0.999 * k {
+                    assert!(close(law.reach(exact - x).expect("reached"), s, 1e-9), "{s}");
+                }
+            }
+        }
+        // Too small for a number: there is no closed form in numbers.
+        assert!(Growth::bernoulli(1e-100, 1.0, -1.0, 6.0).is_none());
     }
 
     proptest! {

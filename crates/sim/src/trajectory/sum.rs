@@ -29,6 +29,10 @@ pub struct Terms {
     refused: bool,
 }
 
+/// The terms of a solution may be this many times larger at its start than its value there, or than 1. What they cancel is lost: the solution is right
+/// to 1e-12. `x' = -a x + t³` has terms of 6/a⁴.
+const CANCELLATION: f64 = 1e4;
+
 /// Exponents that differ by less than this part of their size, but are not equal, would cancel digits.
 const RESONANCE: f64 = 1e-4;
 
@@ -198,7 +202,10 @@ impl Terms {
             }
         }
         out.add(Term { re: x - at_start, growth: b, ..Term::default() });
-        if out.refused || out.terms().iter().any(|t| !t.re.is_finite() || !t.im.is_finite()) {
+        // Later the terms cancel each other less: those without a power are the largest only at first. Infinite ones and NaN fail as well.
+        let at_first = out.terms().iter().filter(|t| t.power == 0).map(|t| t.re.hypot(t.im)).sum::<f64>();
+        let finite = out.terms().iter().all(|t| t.re.is_finite() && t.im.is_finite());
+        if out.refused || !finite || at_first > CANCELLATION * x.abs().max(1.0) {
             return None;
         }
         Some(TermSum::new(out))
@@ -371,6 +378,25 @@ mod tests {
         }
         // Almost in resonance: refused.
         assert!(Terms::exponential(0.0, 1.0, -1.0 + 1e-9).solve(0.0, -1.0).is_none());
+    }
+
+    #[test]
+    fn what_would_cancel_is_refused() {
+        // x' = a x + τ^k and x' = a x + sin(τ w) with a slow rate or frequency: the terms are k!/a^(k+1) and 1/w^2, the value of the order of 1.
+        let power = |k: i32| {
+            let tau = Terms::affine(0.0, 1.0);
+            (1..k).fold(tau, |power, _| Terms::product(&power, &tau))
+        };
+        for (k, least) in [(1, 0.02), (2, 0.1), (3, 0.2)] {
+            assert!(power(k).solve(0.0, -1e-5).is_none() && power(k).solve(0.0, -1e-9).is_none());
+            assert!(power(k).solve(0.0, -least).is_some());
+        }
+        let wave = |w: f64| Terms::unary(Unary::Sin, Terms::affine(0.0, w)).scaled(1.0 / w);
+        assert!(wave(1e-8).solve(0.0, 0.0).is_none() && wave(1e-4).solve(1.0, -1e-3).is_none());
+        let x = wave(0.02).solve(0.0, 0.0).expect("a sum");
+        close(x.value(1.0), (1.0 - 0.02f64.cos()) / 4e-4);
+        // Large values may have large terms.
+        assert!(wave(1e-3).solve(1e6, 0.0).is_some());
     }
 
     #[test]

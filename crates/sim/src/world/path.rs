@@ -159,16 +159,13 @@ impl<'p> Path<'p> {
         out.extend(self.state.switches.iter().map(|&on| f64::from(u8::from(on))));
     }
 
-    /// Bounds of all variables that equations read. If `held`, integrated values are those of the middle.
-    pub fn everything_over(&self, lo: f64, hi: f64, held: bool, out: &mut Vec<Interval>) {
+    /// Bounds of all variables that equations read.
+    pub fn everything_over(&self, lo: f64, hi: f64, out: &mut Vec<Interval>) {
         let h = self.h;
         self.each(
             out,
             Interval::constant,
-            |piece| match held {
-                true => Interval::constant(piece.value(0.5 * (lo + hi))),
-                false => piece.over(lo, hi).value,
-            },
+            |piece| piece.over(lo, hi).value,
             |trajectory, x, offset| {
                 let value = trajectory.over(offset + lo * h, offset + hi * h).value;
                 Interval { lo: x + value.lo, hi: x + value.hi, ..value }
@@ -176,6 +173,12 @@ impl<'p> Path<'p> {
             |t| Interval::spanned(t + lo * h, t + hi * h),
         );
         out.extend(self.state.switches.iter().map(|&on| Interval::constant(f64::from(u8::from(on)))));
+    }
+
+    /// The same with the bounds of their rates, per unit of position.
+    pub fn everything_along(&self, lo: f64, hi: f64, out: &mut Vec<Dual<Interval>>) {
+        self.over(lo, hi, out);
+        out.extend(self.state.switches.iter().map(|&on| Dual::constant(f64::from(u8::from(on)))));
     }
 
     /// Bounds of values and rates from one position to another.
@@ -238,6 +241,25 @@ impl<'p> Path<'p> {
             |trajectory, x, offset| around(x + trajectory.value(offset + tau), ROUNDING * x.abs()),
             |t| around(t + tau, 0.0),
         );
+    }
+
+    /// True if some of these variables is integrated: it follows dense output, or may do so, as sums over children.
+    pub fn is_integrated(&self, variables: &[usize]) -> bool {
+        variables.iter().any(|&variable| {
+            if variable >= self.rule.first_aggregate && variable < self.rule.time_variable() {
+                return true;
+            }
+            let mut parameter = variable;
+            for id in std::iter::once(&self.state.id).chain(self.state.context.context()) {
+                let count = self.world.tree.parameters(*id).len();
+                if parameter < count {
+                    let trajectory = self.world.state(*id).and_then(|s| s.trajectories.get(parameter));
+                    return matches!(trajectory, Some(Trajectory::Step(_) | Trajectory::Coupled(_)));
+                }
+                parameter -= count;
+            }
+            false
+        })
     }
 
     /// The estimated error of integrated values along the path, relative to their size; 0 if there are none.

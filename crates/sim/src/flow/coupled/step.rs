@@ -393,7 +393,7 @@ impl FlowStage<'_, '_> {
     fn may_pulse(&self, id: ModuleId) -> bool {
         let clause =
             self.world.state(id).and_then(|s| Some(&self.setup.model.rules[s.rule?].solves[s.solve?]));
-        clause.is_some_and(|solve| solve.has_pulses)
+        clause.is_some_and(|solve| !solve.pulses.is_empty())
     }
 
     /// True if a pulse of some coupled modules may have been overlooked on their present trajectories, from now on.
