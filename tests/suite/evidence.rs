@@ -140,7 +140,7 @@ fn pulses_along_integrated_values_are_seen_in_stiff_equations() {
                 pulse("x")
             ),
             format!(
-                "initial string: A(0, 1, 1)\nA(z, x, y): solve dz/dt = {} - 1e6*(x - y) + 1e6*(x - y), dx/dt = -0.5*y^3, dy/dt = 1e6*(x - y)",
+                "initial string: A(0, 1, 1)\nA(z, x, y): solve dz/dt = {}, dx/dt = -0.5*y^3, dy/dt = 1e6*(x - y)",
                 pulse("y")
             ),
             format!(

@@ -43,6 +43,7 @@ fn operators_bind_as_the_language_says() {
         ("if 1 = 2 | 1 = 1 & 2 = 3 then 1 else 0", 0.0),
         ("max(1, 2) + min(3, 4) + atan2(0, 1) + sign(-3) + floor(1.5) + ceil(1.5)", 7.0),
         ("abs(-2)*sqrt(4)*exp(0)*ln(e)*log10(10)", 4.0),
+        ("1e20*expm1(1e-20)*ln1p(1e-20)*1e20", 1.0),
         ("sin(pi/2) + cosh(0) + tanh(0)", 2.0),
         ("(1 +\n 2 +\n 3)", 6.0),
         ("1 +\n 2", 3.0),

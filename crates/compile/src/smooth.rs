@@ -87,7 +87,9 @@ fn gentle_is_driven(
 fn where_defined(graph: &mut Graph, smooth: NodeId, written: NodeId, first_flag: u32) -> NodeId {
     let nodes = graph.reachable(&[smooth]);
     let is_partial = |id: &NodeId| match graph.node(*id) {
-        Node::Unary(Unary::Sqrt | Unary::Ln | Unary::Log10 | Unary::Asin | Unary::Acos, _) => true,
+        Node::Unary(Unary::Sqrt | Unary::Ln | Unary::Ln1p | Unary::Log10 | Unary::Asin | Unary::Acos, _) => {
+            true
+        }
         Node::Binary(Binary::Pow, _, power) => graph.as_constant(power).is_none_or(|p| p != p.floor()),
         _ => false,
     };

@@ -83,6 +83,11 @@ impl Graph {
             }
             Unary::Exp => value,
             Unary::Ln => self.binary(Binary::Div, one, x),
+            Unary::Expm1 => self.binary(Binary::Add, value, one),
+            Unary::Ln1p => {
+                let sum = self.binary(Binary::Add, one, x);
+                self.binary(Binary::Div, one, sum)
+            }
             Unary::Log10 => {
                 let factor = self.constant(std::f64::consts::LOG10_E);
                 self.binary(Binary::Div, factor, x)
@@ -209,14 +214,14 @@ mod tests {
         /// Against forward differentiation, which is independent code.
         #[test]
         fn derivatives_agree_with_dual_numbers(
-            choices in proptest::collection::vec((0usize..30, 0usize..40, 0usize..40), 1..12),
+            choices in proptest::collection::vec((0usize..32, 0usize..40, 0usize..40), 1..12),
             x in 0.2..3.0f64, y in 0.2..3.0f64,
         ) {
             let mut g = Graph::default();
             let mut nodes = vec![g.var(0), g.var(1), g.constant(0.7), g.constant(2.0)];
             for (op, a, b) in choices {
                 let (a, b) = (nodes[a % nodes.len()], nodes[b % nodes.len()]);
-                let unary = [Unary::Neg, Unary::Sqrt, Unary::Exp, Unary::Ln, Unary::Log10, Unary::Abs, Unary::Sin,
+                let unary = [Unary::Neg, Unary::Sqrt, Unary::Exp, Unary::Ln, Unary::Log10, Unary::Expm1, Unary::Ln1p, Unary::Abs, Unary::Sin,
                     Unary::Cos, Unary::Tan, Unary::Asin, Unary::Acos, Unary::Atan, Unary::Sinh, Unary::Cosh, Unary::Tanh];
                 let binary = [Binary::Add, Binary::Sub, Binary::Mul, Binary::Div, Binary::Pow, Binary::Min, Binary::Max, Binary::Atan2];
                 let node = match op {

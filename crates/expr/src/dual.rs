@@ -74,6 +74,8 @@ impl<T: Differentiable> Value for Dual<T> {
             Unary::Sqrt => over(T::constant(0.5), value),
             Unary::Exp => value,
             Unary::Ln => over(one, x),
+            Unary::Expm1 => T::binary(Binary::Add, value, one),
+            Unary::Ln1p => over(one, T::binary(Binary::Add, one, x)),
             Unary::Log10 => over(T::constant(std::f64::consts::LOG10_E), x),
             Unary::Abs => T::unary(Unary::Sign, x),
             Unary::Sign | Unary::Floor | Unary::Ceil => {

@@ -160,6 +160,8 @@ impl Value for Interval {
             Unary::Exp => a.increasing(f64::exp),
             Unary::Ln => a.clipped(0.0, f64::INFINITY).increasing(f64::ln),
             Unary::Log10 => a.clipped(0.0, f64::INFINITY).increasing(f64::log10),
+            Unary::Expm1 => a.increasing(f64::exp_m1),
+            Unary::Ln1p => a.clipped(-1.0, f64::INFINITY).increasing(f64::ln_1p),
             Unary::Abs => {
                 if a.contains(0.0) {
                     Interval { lo: 0.0, hi: a.magnitude(), ..a }

@@ -21,6 +21,10 @@ pub enum Unary {
     Ln,
     /// Logarithm to base 10; -∞ at 0, NaN below.
     Log10,
+    /// e to the power a, minus 1: with all digits where a is small.
+    Expm1,
+    /// Natural logarithm of 1 + a, with all digits where a is small; -∞ at -1, NaN below.
+    Ln1p,
     /// Absolute value.
     Abs,
     /// -1, 0 or 1; NaN stays NaN.
@@ -84,11 +88,13 @@ pub enum Binary {
 
 impl Unary {
     /// The functions that a model can call by name.
-    pub const NAMED: [(&'static str, Unary); 17] = [
+    pub const NAMED: [(&'static str, Unary); 19] = [
         ("sqrt", Unary::Sqrt),
         ("exp", Unary::Exp),
         ("ln", Unary::Ln),
         ("log10", Unary::Log10),
+        ("expm1", Unary::Expm1),
+        ("ln1p", Unary::Ln1p),
         ("abs", Unary::Abs),
         ("sign", Unary::Sign),
         ("floor", Unary::Floor),
@@ -151,6 +157,8 @@ impl Value for f64 {
             Unary::Exp => a.exp(),
             Unary::Ln => a.ln(),
             Unary::Log10 => a.log10(),
+            Unary::Expm1 => a.exp_m1(),
+            Unary::Ln1p => a.ln_1p(),
             Unary::Abs => a.abs(),
             Unary::Sign => {
                 if a > 0.0 {

@@ -74,6 +74,8 @@ const MAX_STALLED: usize = 100;
 
 /// Changes of equations at one instant. Several modules may change theirs within the resolution of time, but not so many.
 const MAX_STANDING: usize = 1000;
+/// Time stands if it goes on by no more than so many times its resolution from one change of equations to the next.
+const CRAWL: f64 = 1000.0;
 
 impl<'m> Simulation<'m> {
     /// Makes the initial string at t = 0 and lets everything happen that happens there. Without surroundings
@@ -382,13 +384,14 @@ impl<'m> Simulation<'m> {
         }
     }
 
-    /// Checks that equations do not change again and again at one instant.
+    /// Checks that equations do not change again and again while time hardly goes on.
     fn check_standstill(&mut self, id: ModuleId) -> Result<(), Error> {
         let now = self.instant.at;
         let (since, times) = self.progress.standing;
-        let stands = now.since(since) <= now.resolution();
+        let stands = now.since(since) <= (1.0 + CRAWL * times as f64) * now.resolution();
         self.progress.standing = if stands { (since, times + 1) } else { (now, 0) };
-        match times <= MAX_STANDING || !stands {
+        // Many modules may change their equations one after the other within a short time.
+        match times <= MAX_STANDING.max(8 * self.world.tree.len()) || !stands {
             true => Ok(()),
             false => Err(Error::Chattering { site: self.world.site_of_rule(self.setup.model, id, now) }),
         }

@@ -33,6 +33,40 @@ impl EventStage<'_, '_> {
         if !self.setup.is_algebraic {
             return Ok(false);
         }
+        let mut matters = self.solve_again(chosen)?;
+        // Before anything is judged, the equations have the sides of their conditions on which their solutions are.
+        while !chosen && self.take_sides() {
+            if self.events.consistency_rounds > MAX_ROUNDS {
+                let id = self.events.opened[0];
+                let site = self.world.site_of_rule(self.setup.model, id, self.instant.at);
+                return Err(Error::Chattering { site });
+            }
+            matters |= self.solve_again(chosen)?;
+        }
+        Ok(matters)
+    }
+
+    /// Gives the equations of modules that may have jumped the sides of their conditions on which their values are; true if some have changed.
+    fn take_sides(&mut self) -> bool {
+        let mut changed = false;
+        for &id in &self.events.opened {
+            let Some(state) = self.world.state_mut(id) else { continue };
+            let Some((rule, solve)) = state.rule.zip(state.solve) else { continue };
+            let clause = &self.setup.model.rules[rule].solves[solve];
+            if clause.algebraic.is_empty() || state.open.as_ref().is_none_or(|open| open.flow.is_some()) {
+                continue;
+            }
+            let signs = &state.signs;
+            let holds = |s: &dlsys_model::Switch| s.condition.judge(|i| signs[i]) != Truth::No;
+            let sides: crate::world::state::Switches = clause.switches.iter().map(holds).collect();
+            changed |= sides != state.switches;
+            state.switches = sides;
+        }
+        changed
+    }
+
+    /// Solves once for the algebraic parameters; as [`EventStage::make_consistent`].
+    fn solve_again(&mut self, chosen: bool) -> Result<bool, Error> {
         self.events.consistency_rounds += 1;
         let wanted = self.modules_to_solve(chosen);
         if wanted.is_empty() {

@@ -20,6 +20,10 @@ const POINTS: usize = MAX_DEGREE + 1;
 const MAX_STRETCHES: usize = 64;
 /// The positions in a stretch at which the interpolant is compared with the solution.
 const BETWEEN: [f64; 3] = [0.02, 0.37, 0.9];
+/// A kink makes an error so many times as large as the one that is found there.
+const KINK: f64 = 10.0;
+/// Components that are smaller than this in a stretch have the errors of one of this size.
+const SMALL: f64 = 1e-3;
 
 /// The points, and for each coefficient in Bernstein form the weights of the values there.
 static INTERPOLATION: LazyLock<([f64; POINTS], [[f64; POINTS]; POINTS])> = LazyLock::new(|| {
@@ -78,15 +82,16 @@ impl Equations<'_> {
             for (c, v) in all.iter_mut().zip(&values) {
                 (c[0], c[MAX_DEGREE]) = (v[0], v[MAX_DEGREE]);
             }
-            let mut fits = true;
+            let (mut fits, mut error) = (true, 0.0f64);
             let mut state = last.clone();
             for s in BETWEEN {
                 self.follow(step, lo + s * (hi - lo), &mut state)?;
-                let close = |(c, place): (&[f64; POINTS], &usize)| {
-                    let there = state[*place];
-                    (Dense::at(c, s) - there).abs() <= tolerance * there.abs().max(1.0)
-                };
-                fits &= all.iter().zip(&unknowns).all(close);
+                for ((c, values), &place) in all.iter().zip(&values).zip(&unknowns) {
+                    let (off, there) = ((Dense::at(c, s) - state[place]).abs(), state[place].abs());
+                    fits &= off <= tolerance * there.max(1.0);
+                    let size = values.iter().fold(SMALL, |size, v| size.max(v.abs()));
+                    error = error.max(KINK * off / size);
+                }
             }
             if !fits {
                 if stretches.len() + pieces.len() + 2 > MAX_STRETCHES {
@@ -99,7 +104,10 @@ impl Equations<'_> {
             for (c, place) in all.iter_mut().zip(&unknowns) {
                 c[0] = last[*place];
             }
-            stretches.push(step.with(lo, hi, &unknowns, &all));
+            let mut stretch = step.with(lo, hi, &unknowns, &all);
+            // What the polynomials miss is an error like that of integration: a touch within it is not decided.
+            stretch.error = stretch.error.max(error);
+            stretches.push(stretch);
             last = end;
         }
         Ok(stretches)
