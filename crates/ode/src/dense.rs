@@ -43,6 +43,8 @@ pub struct Dense {
     pub h: f64,
     /// Bound of the error of the components, relative to their size; 0 where the output is exact.
     pub error: f64,
+    /// Errors of single components beyond that, absolute, by component in ascending order: where a polynomial stands for a function that is not smooth.
+    pub misfits: Vec<(u32, f64)>,
     degree: usize,
     /// `degree + 1` coefficients for each component.
     coefficients: Vec<f64>,
@@ -53,7 +55,14 @@ impl Dense {
     /// `degree` is at most [`MAX_DEGREE`].
     pub fn new(start: SimTime, end: Option<SimTime>, h: f64, degree: usize, coefficients: Vec<f64>) -> Dense {
         debug_assert!(degree <= MAX_DEGREE);
-        Dense { start, end: end.unwrap_or_else(|| start.after(h)), h, error: 0.0, degree, coefficients }
+        let end = end.unwrap_or_else(|| start.after(h));
+        Dense { start, end, h, error: 0.0, misfits: Vec::new(), degree, coefficients }
+    }
+
+    /// The error of a component beyond [`Dense::error`], absolute.
+    pub fn misfit(&self, component: usize) -> f64 {
+        let place = self.misfits.binary_search_by_key(&(component as u32), |misfit| misfit.0);
+        place.map_or(0.0, |place| self.misfits[place].1)
     }
 
     /// Number of components.
@@ -119,7 +128,7 @@ impl Dense {
         let start = if lo == 0.0 { self.start } else { self.start.after(lo * self.h) };
         let end = if hi == 1.0 { self.end } else { self.start.after(hi * self.h) };
         let h = if lo == 0.0 && hi == 1.0 { self.h } else { end.since(start) };
-        Dense { start, end, h, error: self.error, degree: MAX_DEGREE, coefficients: all }
+        Dense { start, end, h, error: self.error, misfits: Vec::new(), degree: MAX_DEGREE, coefficients: all }
     }
 
     /// One component at a position, and its rate there, per unit of position.

@@ -12,7 +12,7 @@
 //!   at the start itself is not a root: it belongs to the search before.
 //! - The first root is returned: an instant at which the sign becomes another, or zero is touched.
 //! - Zero means within `tolerance`, which should stand for the rounding of the function's values.
-//! - Work is bounded: after `MAX_PIECES` stretches the rest is judged by the signs at their ends only. A function that varies fast gives the length of a
+//! - Work is bounded: after `MAX_PIECES` stretches the rest is judged by the signs at a few places and at the extremes between them. A function that varies fast gives the length of a
 //!   part of the step that is searched with so many of them.
 
 use dlsys_expr::Sign;
@@ -23,6 +23,8 @@ const NARROW: f64 = 1e-13;
 /// Nor are those that end before this.
 const SMALL: f64 = 1e-30;
 const MAX_PIECES: usize = 1024;
+/// The parts of each of the stretches that are left then, at whose ends the function is evaluated.
+const PARTS: usize = 16;
 
 /// A function over a step, for positions 0 to 1.
 pub trait Function {
@@ -151,8 +153,12 @@ impl<F: Function> Search<'_, F> {
         let found = if !self.armed {
             self.leave_zero(lo, hi, end)
         } else {
-            let crossing = self.crossing(lo, hi, end, monotone);
-            if crossing.is_some() || monotone { crossing } else { self.touch(lo, hi, end) }
+            match self.crossing(lo, hi, end, monotone) {
+                None if monotone => None,
+                None if last => self.judge(lo, hi),
+                None => self.touch(lo, hi, end),
+                crossing => crossing,
+            }
         };
         found.map_or(Finding::Nothing, Finding::Root)
     }
@@ -203,6 +209,43 @@ impl<F: Function> Search<'_, F> {
             first_where(lo, at, |x| self.sign_at(x) == Sign::Zero)
         };
         Some(Root { position, at: Sign::Zero, after })
+    }
+
+    /// A root in a stretch that cannot be halved any more, as far as its parts and the extremes in them show one.
+    fn judge(&mut self, lo: f64, hi: f64) -> Option<Root> {
+        let mut from = lo;
+        for i in 1..=PARTS {
+            let to = if i == PARTS { hi } else { lo + (hi - lo) * (i as f64 / PARTS as f64) };
+            for at in [self.extreme(from, to), Some(to)].into_iter().flatten() {
+                let end = self.sign_at(at);
+                let root = self.crossing(from, at, end, false).or_else(|| self.touch(from, at, end));
+                if root.is_some() {
+                    return root;
+                }
+            }
+            from = to;
+        }
+        None
+    }
+
+    /// The place nearest to zero of a stretch at whose ends the function goes towards zero and away from it.
+    fn extreme(&mut self, mut lo: f64, mut hi: f64) -> Option<f64> {
+        let towards = if self.sign == Sign::Plus { -1.0 } else { 1.0 };
+        let mut comes = |at: f64| {
+            let rate = self.f.bounds(at, at).rate;
+            towards * (0.5 * (rate.lo + rate.hi)) > 0.0
+        };
+        if !comes(lo) || comes(hi) {
+            return None;
+        }
+        while hi - lo > f64::EPSILON * hi {
+            let middle = 0.5 * (lo + hi);
+            if middle <= lo || middle >= hi {
+                break;
+            }
+            if comes(middle) { lo = middle } else { hi = middle }
+        }
+        Some(hi)
     }
 
     /// The end of a zero that has lasted since the start of the search, in a stretch that has the sign `end` at its end.
@@ -396,6 +439,27 @@ mod tests {
         assert_eq!((root.position, root.at, root.after), (0.5, Sign::Zero, Sign::Zero));
         let leaves = first_root(&mut rests, 0.5, 1.0, Sign::Zero, 1e-15).expect("a root");
         assert!((leaves.position - 0.75).abs() < 1e-12 && leaves.after == Sign::Plus, "{leaves:?}");
+    }
+
+    #[test]
+    fn flat_touches_are_found_wherever_the_step_begins() {
+        // 1 + 3 (x - c)^4 - 1, written out as a polynomial, whose bounds are wider.
+        for i in 0..60 {
+            let at = 0.01 * f64::from(i) + 0.203;
+            let mut f = given!(x => |k: fn(f64) -> T, op: fn(Binary, T, T) -> T, _: fn(Unary, T) -> T| {
+                let add = |a, b| op(Binary::Add, a, b);
+                let mul = |a, b| op(Binary::Mul, a, b);
+                let rest = add(k(-12.0 * at), mul(k(3.0), x));
+                let rest = add(k(18.0 * at * at), mul(rest, x));
+                let rest = add(k(-12.0 * at * at * at), mul(rest, x));
+                op(Binary::Sub, add(k(1.0 + 3.0 * at * at * at * at), mul(rest, x)), k(1.0))
+            });
+            let touch = first_root(&mut f, 0.0, 1.0, Sign::Plus, 6e-14);
+            assert!(
+                touch.is_some_and(|t| (t.position - at).abs() < 1e-3 && t.at == Sign::Zero),
+                "{at}: {touch:?}"
+            );
+        }
     }
 
     #[test]

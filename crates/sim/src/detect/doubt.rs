@@ -309,7 +309,8 @@ impl CrossingDetector {
     /// `factor` times the error of integration.
     pub fn is_about_to_meet(&mut self, path: &Path, atom: usize, sign: Sign, factor: f64) -> bool {
         let gap = sign_of(sign) * self.difference(path, atom).value(0.0);
-        if gap > FAR * factor * path.error() * (1.0 + gap) || gap > factor * self.noise(path, atom, 0.0) {
+        let error = path.error().max(f64::EPSILON);
+        if gap > FAR * factor * error * (1.0 + gap) || gap > factor * self.noise(path, atom, 0.0) {
             return false;
         }
         let rate = self.difference(path, atom).bounds(0.0, 1.0).rate;

@@ -3,10 +3,15 @@
 use super::EventStage;
 use crate::detect::doubt::FAR;
 use crate::detect::signs::{opposite, produces};
+use crate::flow::algebraic::is_algebraic;
 use crate::world::path::Path;
 use crate::world::state::{Change, NextKind, Signs};
 use dlsys_model::Sign;
 use dlsys_tree::ModuleId;
+use smallvec::SmallVec;
+
+/// The rounding of values, relative to them.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 impl EventStage<'_, '_> {
     /// Opens the modules that read one that has an event now, and whose own event is not later by more than the error.
@@ -23,8 +28,7 @@ impl EventStage<'_, '_> {
             };
             known += 1;
             let other = self.flows.error_of(self.world, id);
-            for at in 0..self.neighbours.lookers(id).len() {
-                let looker = self.neighbours.lookers(id)[at];
+            for looker in self.lookers_through_values(id) {
                 if let Some(change) = self.tie(looker, other) {
                     let before = self.events.opened.len();
                     self.touch(looker, &[change]);
@@ -34,10 +38,26 @@ impl EventStage<'_, '_> {
         }
     }
 
+    /// The modules that read a module, and those that read it through values of modules that read it.
+    fn lookers_through_values(&self, id: ModuleId) -> SmallVec<[ModuleId; 8]> {
+        let mut found: SmallVec<[ModuleId; 8]> = self.neighbours.lookers(id).iter().copied().collect();
+        let mut at = 0;
+        while self.setup.is_algebraic && at < found.len() {
+            if is_algebraic(self.setup.model, self.world, found[at]) {
+                let more = self.neighbours.lookers(found[at]).iter().filter(|looker| **looker != id);
+                let more: SmallVec<[ModuleId; 8]> =
+                    more.copied().filter(|looker| !found.contains(looker)).collect();
+                found.extend(more);
+            }
+            at += 1;
+        }
+        found
+    }
+
     /// The production of a module that is not later than now by more than the error, beside an event of a module whose
     /// values have the error `other`.
     fn tie(&mut self, id: ModuleId, other: f64) -> Option<Change> {
-        let state = self.world.state(id).filter(|s| s.is_numeric() && s.open.is_none())?;
+        let state = self.world.state(id).filter(|s| s.open.is_none())?;
         let rule = &self.setup.model.rules[state.rule?];
         if rule.produces.is_empty() || rule.atoms.is_empty() {
             return None;
@@ -50,7 +70,11 @@ impl EventStage<'_, '_> {
             _ => self.instant.at,
         };
         let path = Path::new(self.world, state, rule, self.instant.at, 64.0 * self.instant.at.resolution());
-        let error = path.error();
+        let error = match path.error() {
+            // Formulas in values: only rounding keeps them apart.
+            0.0 if self.setup.is_algebraic => ROUNDING,
+            error => error,
+        };
         let reach = self.flows.reach_of(self.world, id);
         let factor = if error > 0.0 { 1.0 + other / error } else { 0.0 };
         if known.since(self.instant.at) > FAR * factor * error * reach.max(self.instant.at.resolution()) {
@@ -64,6 +88,7 @@ impl EventStage<'_, '_> {
             error > 0.0
                 && matches!(signs[atom], Sign::Plus | Sign::Minus)
                 && produces(rule, &signs, atom)
+                && path.is_integrated(&rule.atom_reads[atom])
                 && self.detector.crossings.is_about_to_meet(&path, atom, signs[atom], factor)
         })?;
         Some(Change {

@@ -154,9 +154,9 @@ impl<'c> DenseComponent<'c> {
         self.scaled(self.dense.stretch(&mut sum, self.position(lo), self.position(hi)))
     }
 
-    /// The estimated error, relative to its size.
-    pub fn error(&self) -> f64 {
-        self.dense.error
+    /// The estimated error of a value of a size.
+    pub fn error_of(&self, size: f64) -> f64 {
+        self.dense.error * size + self.dense.misfit(self.component)
     }
 
     /// Bounds over the whole stretch.

@@ -236,7 +236,7 @@ impl<'p> Path<'p> {
             |x| around(x, 0.0),
             // Beyond the position the step may lead anywhere.
             |piece| {
-                around(piece.value(position), piece.error() * piece.over(0.0, position).value.magnitude())
+                around(piece.value(position), piece.error_of(piece.over(0.0, position).value.magnitude()))
             },
             |trajectory, x, offset| around(x + trajectory.value(offset + tau), ROUNDING * x.abs()),
             |t| around(t + tau, 0.0),
@@ -288,7 +288,7 @@ impl<'p> Path<'p> {
             Interval::constant,
             |piece| {
                 let bounds = piece.bounds();
-                let width = piece.error() * bounds.magnitude();
+                let width = piece.error_of(bounds.magnitude());
                 Interval { lo: bounds.lo - width, hi: bounds.hi + width, ..bounds }
             },
             |trajectory, x, offset| {

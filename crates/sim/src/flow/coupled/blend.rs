@@ -22,8 +22,8 @@ const MAX_STRETCHES: usize = 64;
 const BETWEEN: [f64; 3] = [0.02, 0.37, 0.9];
 /// A kink makes an error so many times as large as the one that is found there.
 const KINK: f64 = 10.0;
-/// Components that are smaller than this in a stretch have the errors of one of this size.
-const SMALL: f64 = 1e-3;
+/// What is found there may be rounding, up to so many times that of the values.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// The points, and for each coefficient in Bernstein form the weights of the values there.
 static INTERPOLATION: LazyLock<([f64; POINTS], [[f64; POINTS]; POINTS])> = LazyLock::new(|| {
@@ -82,15 +82,19 @@ impl Equations<'_> {
             for (c, v) in all.iter_mut().zip(&values) {
                 (c[0], c[MAX_DEGREE]) = (v[0], v[MAX_DEGREE]);
             }
-            let (mut fits, mut error) = (true, 0.0f64);
+            let mut fits = true;
+            let mut misfits: Vec<(u32, f64)> = unknowns.iter().map(|c| (*c as u32, 0.0)).collect();
             let mut state = last.clone();
             for s in BETWEEN {
                 self.follow(step, lo + s * (hi - lo), &mut state)?;
-                for ((c, values), &place) in all.iter().zip(&values).zip(&unknowns) {
+                for (((c, values), &place), misfit) in
+                    all.iter().zip(&values).zip(&unknowns).zip(&mut misfits)
+                {
                     let (off, there) = ((Dense::at(c, s) - state[place]).abs(), state[place].abs());
                     fits &= off <= tolerance * there.max(1.0);
-                    let size = values.iter().fold(SMALL, |size, v| size.max(v.abs()));
-                    error = error.max(KINK * off / size);
+                    if off > ROUNDING * values.iter().fold(0.0, |size: f64, v| size.max(v.abs())) {
+                        misfit.1 = misfit.1.max(KINK * off);
+                    }
                 }
             }
             if !fits {
@@ -106,7 +110,11 @@ impl Equations<'_> {
             }
             let mut stretch = step.with(lo, hi, &unknowns, &all);
             // What the polynomials miss is an error like that of integration: a touch within it is not decided.
-            stretch.error = stretch.error.max(error);
+            misfits.retain(|misfit| misfit.1 > 0.0);
+            if !misfits.is_empty() {
+                misfits.sort_unstable_by_key(|misfit| misfit.0);
+                (stretch.error, stretch.misfits) = (stretch.error.max(f64::EPSILON), misfits);
+            }
             stretches.push(stretch);
             last = end;
         }
