@@ -215,7 +215,9 @@ fn touches_of_a_neighbours_formula_are_events_or_reported() {
             );
             let settings = Settings { tolerance, ..Settings::default() };
             match first_event(&text, settings, 6.0) {
-                Ok(t) => assert!(t.is_some_and(|t| (t - 1.0).abs() <= f64::max(slack, tolerance)), "{t:?}\n{text}"),
+                Ok(t) => {
+                    assert!(t.is_some_and(|t| (t - 1.0).abs() <= f64::max(slack, tolerance)), "{t:?}\n{text}")
+                }
                 Err(error) => {
                     assert!(slack == 0.0 && matches!(error, Error::InDoubt { .. }), "{error}\n{text}")
                 }

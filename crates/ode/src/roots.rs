@@ -196,7 +196,11 @@ impl<F: Function> Search<'_, F> {
     fn touch(&mut self, lo: f64, hi: f64, end: Sign) -> Option<Root> {
         let (sign, middle) = (self.sign, 0.5 * (lo + hi));
         let seen = [(middle, self.sign_at(middle)), (hi, end)];
-        let (at, _) = seen.into_iter().find(|(_, seen)| *seen == Sign::Zero)?;
+        let at = match seen.into_iter().find(|(_, seen)| *seen == Sign::Zero) {
+            Some((at, _)) => at,
+            // A corner may touch zero between them.
+            None => self.extreme(lo, hi).filter(|at| self.sign_at(*at) == Sign::Zero)?,
+        };
         // A kink in a crossing looks like one, as far as its value is zero.
         let (beyond, after) = self.way_out(at);
         let position = if after == opposite(sign) {
@@ -439,6 +443,22 @@ mod tests {
         assert_eq!((root.position, root.at, root.after), (0.5, Sign::Zero, Sign::Zero));
         let leaves = first_root(&mut rests, 0.5, 1.0, Sign::Zero, 1e-15).expect("a root");
         assert!((leaves.position - 0.75).abs() < 1e-12 && leaves.after == Sign::Plus, "{leaves:?}");
+    }
+
+    #[test]
+    fn corners_that_touch_zero_are_found_wherever_they_are() {
+        for i in 1..200 {
+            let at = f64::from(i) * 0.005;
+            let mut f = given!(x => |k: fn(f64) -> T, op: fn(Binary, T, T) -> T, _: fn(Unary, T) -> T| {
+                let d = op(Binary::Sub, x, k(at));
+                op(Binary::Max, op(Binary::Mul, d, k(-1.0)), op(Binary::Mul, d, k(3.0)))
+            });
+            let touch = first_root(&mut f, 0.0, 1.0, Sign::Plus, 1e-16);
+            assert!(
+                touch.is_some_and(|t| (t.position - at).abs() < 1e-15 && t.at == Sign::Zero),
+                "{at}: {touch:?}"
+            );
+        }
     }
 
     #[test]

@@ -9,6 +9,7 @@ use dlsys_expr::{Dual, Interval, Value};
 use dlsys_model::{AffineSum, Rule};
 use dlsys_ode::Dense;
 use dlsys_tree::{ModuleId, SimTime};
+use smallvec::SmallVec;
 
 /// The rounding error of a value, relative to it.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -243,18 +244,25 @@ impl<'p> Path<'p> {
         );
     }
 
-    /// True if some of these variables is integrated: it follows dense output, or may do so, as sums over children.
+    /// True if some of these variables is integrated: it follows dense output, or is a sum in which something does.
     pub fn is_integrated(&self, variables: &[usize]) -> bool {
+        let numeric = |trajectory: &Trajectory| !trajectory.is_formula();
         variables.iter().any(|&variable| {
-            if variable >= self.rule.first_aggregate && variable < self.rule.time_variable() {
-                return true;
+            let aggregate = variable.checked_sub(self.rule.first_aggregate);
+            if let Some(number) = aggregate.filter(|number| *number < self.rule.aggregates.len()) {
+                let term = self.rule.aggregates[number].term.reads();
+                let others = term.iter().copied().filter(|v| *v < self.rule.first_aggregate);
+                let mut children = self.state.context.children(number).iter();
+                return self.is_integrated(&others.collect::<SmallVec<[usize; 8]>>())
+                    || children
+                        .any(|id| self.world.state(*id).is_some_and(|s| s.trajectories.iter().any(numeric)));
             }
             let mut parameter = variable;
             for id in std::iter::once(&self.state.id).chain(self.state.context.context()) {
                 let count = self.world.tree.parameters(*id).len();
                 if parameter < count {
                     let trajectory = self.world.state(*id).and_then(|s| s.trajectories.get(parameter));
-                    return matches!(trajectory, Some(Trajectory::Step(_) | Trajectory::Coupled(_)));
+                    return trajectory.is_some_and(numeric);
                 }
                 parameter -= count;
             }
