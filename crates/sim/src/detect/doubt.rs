@@ -297,7 +297,7 @@ impl CrossingDetector {
 
     /// Half the width of the band: the effect of the errors of integration and rounding on the difference of two sides.
     /// 0 where the difference jumps.
-    fn noise(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+    pub(super) fn noise(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
         path.uncertain(at, &mut self.around);
         let sides = &path.rule.sides;
         self.around_out.resize(sides.outputs(), Interval::EMPTY);

@@ -157,6 +157,11 @@ impl Search<'_, '_> {
             let query = AtomQuery { atom, from, limit, sign, tolerance, near, decides, error };
             return self.detector.look(self.path, query);
         }
+        // A step may begin where a formula has come back to zero from a value whose rounding is larger.
+        let tolerance = match self.is_integrated() {
+            true => tolerance.max(self.detector.noise(self.path, atom, from)),
+            false => tolerance,
+        };
         let next = self.detector.root(self.path, atom, from, limit, sign, tolerance);
         Lookahead { next, ..Lookahead::default() }
     }
