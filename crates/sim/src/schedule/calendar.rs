@@ -400,7 +400,8 @@ mod tests {
                     let mut found = out;
                     found.sort_unstable();
                     let first = list.iter().map(|e| e.0).min();
-                    let wanted: Vec<u32> = list.iter().filter(|e| Some(e.0) == first).map(|e| e.1).collect();
+                    let mut wanted: Vec<u32> = list.iter().filter(|e| Some(e.0) == first).map(|e| e.1).collect();
+                    wanted.sort_unstable();
                     prop_assert_eq!(found, wanted);
                     list.retain(|e| Some(e.0) != first);
                 } else if what == 6 {
