@@ -236,7 +236,7 @@ pub struct RunArgs {
     /// Draw the distributions of the measures over time as SVG: median, mean, bands of 50 and 90 per cent of specimens
     #[arg(long, value_name = "FILE", requires = "seeds")]
     pub plot: Option<PathBuf>,
-    /// Number of specimens run at once, or of threads that draw, with no effect on the results [default: one for each core]
+    /// Number of specimens run at once, or of threads that compute and draw, with no effect on the results [default: one for each core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,
 }

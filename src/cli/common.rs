@@ -227,6 +227,11 @@ fn ready(args: &SharedArgs) -> Result<(), Failure> {
     spare_files(args)
 }
 
+/// Number of threads by default: one for each core.
+pub fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
 /// The settings given by the flags.
 ///
 /// # Errors
@@ -290,6 +295,12 @@ impl ModelRun {
         }
         let (remarks, sway) = Default::default();
         Ok(ModelRun { session, remarks, times, settings, detail: None, sway, clock: Clock::default() })
+    }
+
+    /// The same on so many threads; by default on one for each core. Results do not depend on it.
+    pub fn on_threads(mut self, threads: Option<usize>) -> ModelRun {
+        self.settings.threads = threads.unwrap_or_else(cores);
+        self
     }
 
     /// Starts a simulation.

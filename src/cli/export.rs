@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::album::Keeping;
 use super::args::{RenderArgs, RunArgs};
-use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of};
+use super::common::{Clock, Failure, ModelRun, cores, count_of, out_error, size_of};
 use super::events::EventLog;
 use super::frame_source::{Frame, Pass, play_at};
 use super::one_file::{file_of, place_of, save, spare, spare_copy};
@@ -76,11 +76,6 @@ pub fn refuse_flags(args: &RunArgs) -> Result<(), Failure> {
             "{flag} is for animated files; add --format glb or usda, or leave it out and take what is printed: `dlsys run … > strings.txt`"
         )));
     }
-    if args.threads.is_some() && args.seeds.is_none() {
-        return Err(usage(
-            "--threads is for --seeds and for animated files (--format glb or usda); a single run has one thread",
-        ));
-    }
     Ok(())
 }
 
@@ -113,7 +108,7 @@ pub fn run(args: &RunArgs, format: interchange::Format) -> Result<(), Failure> {
         quiet: false,
     };
     order.spare()?;
-    write(&order, ModelRun::start(&args.shared)?, &|| false)
+    write(&order, ModelRun::start(&args.shared)?.on_threads(args.threads), &|| false)
 }
 
 /// `dlsys render MODEL --format glb -o FILE`.
@@ -123,7 +118,7 @@ pub fn render(
     stale: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), Failure> {
     order_of(args, format)?.spare()?;
-    render_run(args, format, ModelRun::start(&args.shared)?, stale)
+    render_run(args, format, ModelRun::start(&args.shared)?.on_threads(args.threads), stale)
 }
 
 /// The same for a model that has been read.
@@ -166,10 +161,6 @@ fn refuse(format: interchange::Format, given: &[(&str, bool)], why: &str) -> Res
         ))),
         None => Ok(()),
     }
-}
-
-fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// Runs the model twice: to measure it, because all accuracy is relative to its extent, and to follow it.

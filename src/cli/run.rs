@@ -33,7 +33,7 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
 
 /// Parts of a run to a single time, for its progress.
 const WAY: usize = 1000;
-/// Number of events and steps between updates of the progress.
+/// Least number of events and steps between updates of the progress.
 const STRIDE: usize = 1000;
 
 /// Runs a model and prints its strings.
@@ -50,6 +50,7 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
     if let Some(seeds) = args.seeds {
         return super::specimens::summarise(args, &run, seeds, format);
     }
+    let run = run.on_threads(args.threads);
     let mut clock = run.clock;
     let mut out = std::io::BufWriter::with_capacity(1 << 16, std::io::stdout().lock());
     let printer = Printer::new(&run.session.model);
@@ -66,7 +67,7 @@ pub fn run(args: &RunArgs) -> Result<(), Failure> {
         };
         for &t in &run.times {
             let before = Instant::now();
-            while alone && let Ok(Passed::Some) = simulation.pass_some(t, STRIDE, false) {
+            while alone && let Ok(Passed::Some) = simulation.pass_piece(t, STRIDE) {
                 progress.reach(simulation.reached() / t);
             }
             let done = simulation.at(t, &mut string);

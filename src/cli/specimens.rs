@@ -9,7 +9,7 @@ use std::path::Path;
 use serde_json::json;
 
 use super::args::RunArgs;
-use super::common::{Failure, ModelRun, coloured, out_error};
+use super::common::{Failure, ModelRun, coloured, cores, out_error};
 use super::output;
 use super::parallel;
 use super::progress::Progress;
@@ -42,7 +42,7 @@ pub fn summarise(args: &RunArgs, run: &ModelRun, seeds: Seeds, format: TextForma
             seeds.count()
         )));
     }
-    let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
+    let threads = args.threads.unwrap_or_else(cores);
     let mut progress = Progress::of_printed("specimens", seeds.count());
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
     // One list for each measure and time, with the specimens in the order of seeds.

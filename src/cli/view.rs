@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::album::Keeping;
 use super::args::ViewArgs;
-use super::common::{Failure, ModelRun, count_of, out_error};
+use super::common::{Failure, ModelRun, cores, count_of, out_error};
 use super::frame_source::{Frame, Pass, play};
 use super::progress::Progress;
 use crate::diagnostic::Diagnostic;
@@ -74,7 +74,7 @@ fn open(args: &ViewArgs) -> Result<(), Failure> {
 /// Writes the page of a model.
 fn write(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
     spare(args, out)?;
-    let run = ModelRun::start(&args.shared)?;
+    let run = ModelRun::start(&args.shared)?.on_threads(None);
     let count = run.times.len();
     if count > MOST_FRAMES {
         return Err(Failure::Usage(format!(
@@ -114,7 +114,7 @@ fn spare(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
 /// Runs the model twice, because recorded coordinates are relative to the extent of the animation. Frames are drawn on all
 /// cores; the recording does not depend on their number.
 fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = cores();
     run.take_ground_in_pieces();
     let mut clock = run.clock;
     let nothing = Survey::new(View::FRONT);

@@ -1,6 +1,7 @@
 //! The clauses of a rule, lowered to the graph: conditions, productions and equations.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 
 use crate::analysis::never_reached;
 use crate::chance::{Hazard, production_keys};
@@ -25,6 +26,14 @@ struct Frame<'r> {
     /// Number of all variables, switches excluded.
     count: usize,
 }
+
+/// Equations, the numbers of the module's parameters, of those of the context, and of all variables.
+type Flow = (Vec<(usize, NodeId)>, [usize; 3]);
+
+/// By flow and by the two sides of an atom: true if the flow cannot make them equal. Rules that differ in names only have the same
+/// expressions.
+#[derive(Default)]
+pub struct OutOfReach(HashMap<Flow, HashMap<(NodeId, NodeId), bool>>);
 
 /// The condition of a clause.
 #[derive(Default)]
@@ -182,7 +191,8 @@ impl RuleBuilder<'_> {
             };
             equations.rates.extend(hazards.iter().filter_map(|hazard| self.clock_rate(hazard, guard.node)));
             equations.rates.extend(self.input_rates(rule));
-            let (smooth, switches) = self.smooth(equations.all(), own, count, clause.span, atoms)?;
+            let (smooth, switches) =
+                self.smooth_as_before(equations.all(), own, count, clause.span, atoms)?;
             equations.set_all(smooth);
             all.push(Smooth { guard: guard.condition.clone(), span: clause.span, equations, switches });
         }
@@ -193,7 +203,7 @@ impl RuleBuilder<'_> {
             let span = clock.map_or(rule.head, |first| productions.produces[first.produce].span);
             let clocks = hazards.iter().filter_map(|hazard| self.clock_rate(hazard, None));
             let rates = clocks.collect::<Vec<_>>().into_iter().chain(inputs).collect();
-            let (rates, switches) = self.smooth(rates, own, count, span, atoms)?;
+            let (rates, switches) = self.smooth_as_before(rates, own, count, span, atoms)?;
             let equations = Equations { rates, algebraic: Vec::new() };
             all.push(Smooth { guard: Condition::default(), span, equations, switches });
         }
@@ -212,11 +222,13 @@ impl RuleBuilder<'_> {
                 let read = graph.variables(&[a, b]);
                 algebraic.iter().any(|entry| read.contains(&(entry.parameter as u32)))
             };
-            let unreachable = (atoms.sides.iter())
-                .map(|&sides| {
-                    !given(graph, sides) && never_reached(graph, sides, &rates, frame.own, context, total)
-                })
-                .collect();
+            let known = self.out_of_reach.0.entry((rates.clone(), [frame.own, context, total])).or_default();
+            let mut is_never = |graph: &mut Graph, sides: (NodeId, NodeId)| {
+                let find = || never_reached(graph, sides, &rates, frame.own, context, total);
+                *known.entry(sides).or_insert_with(find)
+            };
+            let unreachable =
+                atoms.sides.iter().map(|&sides| !given(graph, sides) && is_never(graph, sides)).collect();
             solves.push(DeclaredSolve { guard, span, rates, algebraic, switches, unreachable });
         }
         solves

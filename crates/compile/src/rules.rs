@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use crate::advice;
 use crate::chance::Clocks;
+use crate::clauses::OutOfReach;
 use crate::declared::DeclaredPattern;
 use crate::inputs::{Handing, Inputs};
 use crate::scene_checks::MaterialNumber;
 use crate::scope::{RESERVED, Scope, Variables};
+use crate::smooth::Smoothed;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::NodeId;
 use dlsys_model::{CUT, Class, DRAWN_WORDS, Interpretation, KindId, Kinds, base_of, class_of};
@@ -24,6 +26,10 @@ pub struct RuleBuilder<'b> {
     pub inputs: Inputs,
     /// What modules of the string that is being lowered take over from the module that they replace.
     pub(super) handing: Handing,
+    /// Equations that were made smooth for rules before.
+    pub(super) smoothed: Smoothed,
+    /// What flows cannot reach, for rules before.
+    pub(super) out_of_reach: OutOfReach,
     /// Number of brackets that are open around the part of a string that is being lowered.
     pub(super) open_around: usize,
     /// Each kind that occurs in a string, with its first place.
@@ -42,9 +48,22 @@ impl<'b> RuleBuilder<'b> {
         kinds: &'b mut Kinds,
         (clocks, inputs): (Clocks, Inputs),
     ) -> RuleBuilder<'b> {
-        let (occurs, drawn, materials) = Default::default();
+        let (occurs, drawn, materials, smoothed, out_of_reach) = Default::default();
         let (handing, open_around) = (Handing::default(), 0);
-        RuleBuilder { document, scope, kinds, clocks, inputs, handing, open_around, occurs, drawn, materials }
+        RuleBuilder {
+            document,
+            scope,
+            kinds,
+            clocks,
+            inputs,
+            handing,
+            smoothed,
+            out_of_reach,
+            open_around,
+            occurs,
+            drawn,
+            materials,
+        }
     }
 
     /// Number of hidden parameters of a module.

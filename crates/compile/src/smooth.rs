@@ -3,6 +3,7 @@
 //! An equation is smooth between the instants at which its conditions change, so that an integrator keeps its order there.
 //! Each condition becomes a variable, and its change an event (see [`Switch`]).
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::analysis::{driven_form, outside_of_drivers};
@@ -12,14 +13,43 @@ use dlsys_diagnostic::Span;
 use dlsys_expr::{Binary, Graph, Node, NodeId, NodeMap, NodeSet, Part, Unary};
 use dlsys_model::Switch;
 
+/// Equations of a clause, the number of the module's parameters, and that of all variables.
+type Written = (Vec<(usize, NodeId)>, usize, usize);
+
+/// Equations without conditions that have been made smooth before, and what became of them: rules that differ in names only have the
+/// same expressions.
+#[derive(Default)]
+pub struct Smoothed(HashMap<Written, Vec<(usize, NodeId)>>);
+
 impl RuleBuilder<'_> {
+    /// As [`smooth`](RuleBuilder::smooth), once for equations without conditions that many rules have.
+    #[allow(clippy::type_complexity)]
+    pub(super) fn smooth_as_before(
+        &mut self,
+        rates: Vec<(usize, NodeId)>,
+        own: usize,
+        count: usize,
+        span: Span,
+        atoms: &mut Atoms,
+    ) -> Option<(Vec<(usize, NodeId)>, Vec<Switch>)> {
+        let written = (rates, own, count);
+        if let Some(smooth) = self.smoothed.0.get(&written) {
+            return Some((smooth.clone(), Vec::new()));
+        }
+        let (smooth, switches) = self.smooth(written.0.clone(), own, count, span, atoms)?;
+        if switches.is_empty() {
+            self.smoothed.0.insert(written, smooth.clone());
+        }
+        Some((smooth, switches))
+    }
+
     /// Makes equations smooth: conditions inside them become variables, numbered from `count` on. The first `own` variables
     /// are the module's parameters, the last two `t` and `age`.
     ///
     /// Curves and growth functions of time with a known integral are preserved where they give the whole rate a formula.
     /// Otherwise the piece of a curve is frozen like a condition.
     #[allow(clippy::type_complexity)]
-    pub(super) fn smooth(
+    fn smooth(
         &mut self,
         rates: Vec<(usize, NodeId)>,
         own: usize,

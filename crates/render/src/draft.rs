@@ -8,6 +8,8 @@
 //! stem of less than [`THIN`] pixels is a ribbon: two triangles, of the right width from any side. A plant of another model has drafts
 //! of its own, one for each power of two of its size in the picture, which all plants of that look share.
 
+use std::ops::Range;
+
 use super::triangles::{Solid, Triangle, Triangles};
 use super::tube::{TubeStyle, Tubes, sides_for};
 use dlsys_geometry::scene::{MaterialId, Placement, Point, Scene, Texture, Vector};
@@ -154,16 +156,40 @@ impl<'s> Draft<'s> {
         })
     }
 
-    /// The thin stems as ribbons, each placed, facing the viewer.
+    /// Number of thin stems.
+    pub(super) fn thin(&self) -> usize {
+        self.thin.len()
+    }
+
+    /// The middle and the radius of a ball around the ribbons of some thin stems.
+    pub(super) fn ball_around(&self, stems: Range<usize>) -> (Point, f64) {
+        let (mut low, mut high) = (Point::from([f64::INFINITY; 3]), Point::from([f64::NEG_INFINITY; 3]));
+        let mut widest = 0.0_f64;
+        for &i in &self.thin[stems] {
+            let segment = &self.scene.segments[i as usize];
+            for end in [segment.start, segment.end] {
+                (low, high) = (low.inf(&end), high.sup(&end));
+            }
+            widest = segment
+                .widths
+                .map(|width| width.resolve(self.default_width))
+                .into_iter()
+                .fold(widest, f64::max);
+        }
+        (nalgebra::center(&low, &high), (high - low).norm() / 2.0 + LONGEST * widest)
+    }
+
+    /// Some of the thin stems as ribbons, each placed, facing the viewer.
     pub(super) fn ribbons<'d>(
         &'d self,
+        stems: Range<usize>,
         place: Option<&'d Placement>,
         towards: impl Fn(Point) -> Vector + 'd,
     ) -> impl Iterator<Item = Ribbon> + 'd {
         let (width, scale) = (self.default_width, place.map_or(1.0, |place| place.largest()));
         let point = move |p: Point| place.map_or(p, |place| place.point(p));
         let direction = move |v: Vector| place.map_or(v, |place| place.turned(v));
-        self.thin.iter().filter_map(move |&i| {
+        self.thin[stems].iter().filter_map(move |&i| {
             let segment = &self.scene.segments[i as usize];
             let radii = segment.widths.map(|w| w.resolve(width) / 2.0 * scale);
             if radii[0] <= 0.0 && radii[1] <= 0.0 {

@@ -13,8 +13,7 @@ pub(super) fn rounded(x: f64, decimals: usize) -> f64 {
 
 /// Appends a number, rounded to so many decimals, without trailing zeros and without a negative zero.
 pub fn push(out: &mut String, x: f64, decimals: usize) {
-    if let Some(quick) = text::quick(x, decimals) {
-        out.push_str(quick.as_str());
+    if text::push_quickly(out, x, decimals) {
         return;
     }
     let start = out.len();

@@ -7,8 +7,9 @@
 //! `KIND-LINEAGE`, for the first that a module draws, then `KIND-LINEAGE.2` and so on. Where many frames share a picture,
 //! elements have no names, and neighbours of the same look are one path.
 
-use std::collections::HashMap;
 use std::fmt::Write;
+
+use rustc_hash::FxHashMap;
 
 use super::name::Names;
 use super::stroke::{Stroke, Strokes, is_thin};
@@ -65,7 +66,7 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     if definitions.is_empty() {
         return painter.out;
     }
-    format!("<defs>\n{definitions}</defs>\n{}", painter.out)
+    ["<defs>\n", &definitions, "</defs>\n", &painter.out].concat()
 }
 
 /// An element of the scene, by kind and index.
@@ -98,15 +99,16 @@ struct Painter<'a> {
 
 impl Painter<'_> {
     fn paint(&mut self) {
+        let mut id = String::new();
         for layer in self.layers() {
-            let id = self.names.as_ref().map_or(String::new(), |names| {
-                let name = names.get(layer.owner);
-                if layer.ordinal == 1 {
-                    format!(" id=\"{name}\"")
-                } else {
-                    format!(" id=\"{name}.{}\"", layer.ordinal)
+            id.clear();
+            if let Some(names) = &self.names {
+                id.extend([" id=\"", &names.get(layer.owner)]);
+                if layer.ordinal > 1 {
+                    let _ = write!(id, ".{}", layer.ordinal);
                 }
-            });
+                id.push('"');
+            }
             match layer.thing {
                 Thing::Segment(i) => self.segment(&self.scene.segments[i], i, &id),
                 Thing::Polygon(i) => self.polygon(&self.scene.polygons[i], &id),
@@ -155,7 +157,7 @@ impl Painter<'_> {
             [p.x, p.y].map(|x| (x * 1e3).round() as i64)
         };
         let width = |s: &Segment, k: usize| (s.widths[k].resolve(fit.default_width) * scale * 1e3).round();
-        let mut last: HashMap<[[i64; 2]; 2], [f64; 2]> = HashMap::new();
+        let mut last: FxHashMap<[[i64; 2]; 2], [f64; 2]> = FxHashMap::default();
         let mut covered = vec![false; self.scene.segments.len()];
         for (i, s) in self.scene.segments.iter().enumerate().rev() {
             let mut ends = [(place(s.start), width(s, 0)), (place(s.end), width(s, 1))];
@@ -176,7 +178,7 @@ impl Painter<'_> {
             None => {}
             Some(Stroke::Element { name, attributes }) => {
                 self.end_run();
-                let _ = writeln!(self.out, "<{name}{id}{attributes}/>");
+                self.out.extend(["<", name, id, &attributes, "/>\n"]);
             }
             Some(Stroke::Path { attributes, data }) => self.path(attributes, &data, id),
         }
@@ -223,13 +225,13 @@ impl Painter<'_> {
             self.end_run();
             self.run = Some((attributes, data.to_owned()));
         } else {
-            let _ = writeln!(self.out, "<path{id}{attributes} d=\"{data}\"/>");
+            self.out.extend(["<path", id, &attributes, " d=\"", data, "\"/>\n"]);
         }
     }
 
     fn end_run(&mut self) {
         if let Some((attributes, data)) = self.run.take() {
-            let _ = writeln!(self.out, "<path{attributes} d=\"{data}\"/>");
+            self.out.extend(["<path", &attributes, " d=\"", &data, "\"/>\n"]);
         }
     }
 

@@ -173,7 +173,7 @@ impl Assembly<'_> {
     pub fn finish(self, title: &str) -> Vec<u8> {
         let page = &self.writer.page;
         let Some(mut canvas) = self.canvas else {
-            return svg::around(page, title, None, self.elements).into_bytes();
+            return svg::around(page, title, None, self.elements).concat().into_bytes();
         };
         let [a, b, c] = page.placement();
         let sheet = &self.writer.sheet;

@@ -15,7 +15,7 @@ use super::veil::Veil;
 use dlsys_geometry::scene::{Color, Point, Texture, Vector};
 
 /// Most triangles that are in memory at a time: a picture with more is drawn in strips, if these have fewer.
-const MOST: usize = 6_000_000;
+const MOST: usize = 3_000_000;
 /// Parts that are made side by side.
 const BLOCK: usize = 64;
 /// How far the edges of a ribbon are turned away, as those of a stem: sine and cosine.
@@ -173,6 +173,16 @@ impl Shot<'_> {
 
     /// Adds a draft in its place.
     fn add(&mut self, draft: &Draft, part: &Part) {
+        let stems = part.stems.clone();
+        if stems.as_ref().is_none_or(Range::is_empty) {
+            self.add_mesh(draft, part);
+        }
+        self.add_ribbons(draft, part, stems.unwrap_or(0..draft.thin()));
+        self.surface += 1;
+    }
+
+    /// Adds the triangles of a draft in its place.
+    fn add_mesh(&mut self, draft: &Draft, part: &Part) {
         let place = part.place.as_ref();
         let (vertex, normal) = (self.places.len() as u32, self.normals.len() as u32);
         let mesh = &draft.mesh;
@@ -203,7 +213,12 @@ impl Shot<'_> {
             self.pinned.truncate(vertex as usize);
             self.normals.truncate(normal as usize);
         }
-        for ribbon in draft.ribbons(place, |p| lens.camera.towards(p)) {
+    }
+
+    /// Adds thin stems of a draft in its place.
+    fn add_ribbons(&mut self, draft: &Draft, part: &Part, stems: Range<usize>) {
+        let lens = self.lens;
+        for ribbon in draft.ribbons(stems, part.place.as_ref(), |p| lens.camera.towards(p)) {
             self.surface += 1;
             let (vertex, normal) = (self.places.len() as u32, self.normals.len() as u32);
             self.places.extend(ribbon.corners.iter().flatten().map(|&p| lens.place(p)));
@@ -224,7 +239,6 @@ impl Shot<'_> {
                 self.normals.truncate(normal as usize);
             }
         }
-        self.surface += 1;
     }
 
     /// Adds what is seen of the floor.

@@ -16,7 +16,10 @@ use dlsys_geometry::scene::{Color, Placement, Plant, Point, Scene, Texture};
 /// A plant is near if its nearest point is so many times as large in the picture as its middle.
 const NEAR: f64 = 1.5;
 
-/// A draft in its place.
+/// Thin stems of the scene itself that are one part of a picture.
+const STEMS: usize = 1 << 14;
+
+/// A draft in its place, or some of it.
 pub(super) struct Part {
     /// 0 for the scene itself.
     draft: usize,
@@ -26,6 +29,8 @@ pub(super) struct Part {
     pub(super) colors: u32,
     /// Rows of the picture below and above which nothing of it is seen.
     rows: Range<usize>,
+    /// `None`: all of the draft. Of a scene with many thin stems these only, or, if they are none, its triangles.
+    pub(super) stems: Option<Range<usize>>,
 }
 
 impl Part {
@@ -99,7 +104,7 @@ impl<'s> Stage<'s> {
     pub(super) fn new(scene: &'s Scene, fit: &'s Fit, lens: &'s Lens) -> Stage<'s> {
         let mut plan = Plan {
             wanted: Vec::new(),
-            parts: vec![Part { draft: 0, place: None, colors: 0, rows: 0..lens.size[1] }],
+            parts: Vec::new(),
             colors: Vec::new(),
             textures: Vec::new(),
             looks: HashMap::new(),
@@ -121,11 +126,13 @@ impl<'s> Stage<'s> {
         if detail.is_flat && fit.camera.eye().is_some() {
             scene.flatten(fit.camera.view().towards());
         }
+        let mut parts = parts_of(&scene, lens);
+        parts.append(&mut plan.parts);
         Stage {
             scene,
             wanted: plan.wanted,
             shared,
-            parts: plan.parts,
+            parts,
             colors: plan.colors,
             textures: plan.textures,
             fit,
@@ -142,6 +149,23 @@ impl<'s> Stage<'s> {
         let make = || wanted.draft(self.fit, self.lens);
         if wanted.uses > 1 { work(place.get_or_init(make)) } else { work(&make()) }
     }
+}
+
+/// The parts of the scene itself. Very many thin stems are several, of which each is in few rows of the picture, so that no more of them are made at a
+/// time than there is room for.
+fn parts_of(scene: &Draft, lens: &Lens) -> Vec<Part> {
+    let part = |rows, stems| Part { draft: 0, place: None, colors: 0, rows, stems };
+    let (rows, count) = (0..lens.size[1], scene.thin());
+    if count <= STEMS {
+        return vec![part(rows, None)];
+    }
+    let mut parts = vec![part(rows, Some(0..0))];
+    for start in (0..count).step_by(STEMS) {
+        let stems = start..(start + STEMS).min(count);
+        let (centre, radius) = scene.ball_around(stems.clone());
+        parts.push(part(lens.rows(centre, radius), Some(stems)));
+    }
+    parts
 }
 
 impl<'s> Wanted<'s> {
@@ -198,7 +222,8 @@ impl<'s> Plan<'s> {
             };
             wanted[draft - 1].uses += 1;
             let rows = lens.rows(centre, radius);
-            self.parts.push(Part { draft, place: Some(placement), colors: look.colors, rows });
+            let place = Some(placement);
+            self.parts.push(Part { draft, place, colors: look.colors, rows, stems: None });
             self.add_plants(scene, Some(&placement), lens);
         }
     }
@@ -232,4 +257,58 @@ impl<'s> Plan<'s> {
 fn stands_on(floor: f64, placement: &Placement, radius: f64) -> bool {
     let is_upright = placement.axes[1].y >= 1.0 - 1e-12;
     is_upright && (placement.origin.y - floor).abs() <= 1e-9 * radius * placement.largest()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lighting::Lighting;
+    use crate::{Survey, View, raster, shot};
+    use dlsys_geometry::scene::{MaterialId, Owner, Segment, Vector, Width};
+    use dlsys_tree::Lineage;
+
+    /// A ball of yarn of so many thin stems, of two colours.
+    fn yarn(count: usize) -> Scene {
+        let mut scene = Scene::default();
+        let owner = scene.add_owner(Owner { name: "F".into(), lineage: Lineage::of_axiom(0) });
+        let at = |i: usize| {
+            let (a, b) = (i as f64 * 0.37, i as f64 * 0.000_211);
+            Point::new(a.cos() * b.sin(), b.cos(), a.sin() * b.sin())
+        };
+        for i in 0..count {
+            let (start, end) = (at(i), at(i + 1));
+            scene.segments.push(Segment {
+                start,
+                end,
+                direction: (end - start).normalize(),
+                across: Vector::x(),
+                widths: [Width::Set(0.002); 2],
+                contour: None,
+                material: if i % 5 == 0 { MaterialId::STEM } else { MaterialId::LEAF },
+                owner,
+                follows: i.checked_sub(1),
+                grows_from: None,
+            });
+        }
+        scene
+    }
+
+    #[test]
+    fn many_thin_stems_are_several_parts_with_the_same_pixels() {
+        let scene = yarn(2 * STEMS + 100);
+        let mut survey = Survey::new(View::FRONT);
+        survey.add(&scene);
+        let fit = survey.fit();
+        let lens = Lens::new(&fit, [120, 90], [40.0, 60.0, 45.0]);
+        let mut stage = Stage::new(&scene, &fit, &lens);
+        assert_eq!(stage.parts.len(), 4);
+        assert!(stage.parts[2].touches(&(40..50)));
+        let lighting = Lighting::new(&scene, &fit, lens.scale(), 1, None, Some(&lens));
+        let draw = |threads, stage: &Stage| shot::draw(&raster::FOUR, threads, stage, &lens, &lighting);
+        let parts = draw(1, &stage);
+        assert!(parts.pixels.iter().filter(|pixel| pixel[3] > 0).count() > 1000);
+        assert_eq!(parts, draw(3, &stage));
+        stage.parts = vec![Part { draft: 0, place: None, colors: 0, rows: 0..90, stems: None }];
+        assert_eq!(parts, draw(1, &stage));
+    }
 }

@@ -27,6 +27,8 @@ const STRAIGHT: f64 = 0.999_99;
 const OVERLAP: f64 = 0.7;
 /// How much of the next piece a mitred one takes along, in widths.
 const STUB: f64 = 0.2;
+/// Bytes that the attributes of a stroke take, mostly.
+const ROOM: usize = 128;
 
 /// The mean width of a segment, in pixels of the page.
 pub(super) fn pixels_across(segment: &Segment, style: Style) -> f64 {
@@ -159,8 +161,8 @@ impl<'a> Strokes<'a> {
             segment.widths[i].resolve(fit.default_width) * scale * fit.camera.magnification(z / scale)
         };
         let (wa, wb) = (width(0, a.z), width(1, b.z));
-        let [x1, y1, mut x2, mut y2] = [a.x, a.y, b.x, b.y].map(text);
-        let (from, to) = (text(wa), text(wb));
+        let texts = Texts::new([a.x, a.y, b.x, b.y, wa, wb]);
+        let [x1, y1, x2, y2, from, to] = texts.all();
         if from == "0" && to == "0" {
             return None;
         }
@@ -178,7 +180,8 @@ impl<'a> Strokes<'a> {
             let along = (to - from).xy().normalize() * (OVERLAP * scale / pixels);
             Point::new(to.x + along.x, to.y + along.y, to.z)
         };
-        let mut look = format!(" stroke=\"{paint}\" stroke-width=\"{from}\"");
+        let mut look = String::with_capacity(ROOM);
+        look.extend([" stroke=\"", &paint, "\" stroke-width=\"", from, "\""]);
         if ends.iter().any(|end| matches!(end, End::Mitre(_))) {
             let end = if ends[1] == End::Straight { overlap(a, b) } else { b };
             let data = self.mitred(ends, [a, end], wa);
@@ -187,21 +190,28 @@ impl<'a> Strokes<'a> {
             let attributes = format!(" fill=\"none\"{look} stroke-linejoin=\"miter\"{cap}");
             return Some(Stroke::Path { attributes, data });
         }
+        let longer;
+        let mut end = [x2, y2];
         match ends.map(|end| end == End::Straight) {
             [false, false] => {}
             [true, false] => return outline(half_round(a, b, wa / 2.0)),
             [false, true] => return outline(half_round(overlap(a, b), a, wa / 2.0)),
             [true, true] => {
-                let end = overlap(a, b);
-                [x2, y2] = [end.x, end.y].map(text);
+                let place = overlap(a, b);
+                longer = Texts::new([place.x, place.y]);
+                end = longer.all();
                 look.push_str(" stroke-linecap=\"butt\"");
             }
         }
+        let [x2, y2] = end;
         if as_path {
-            return Some(Stroke::Path { attributes: look, data: format!("M{x1} {y1}L{x2} {y2}") });
+            return Some(Stroke::Path {
+                attributes: look,
+                data: ["M", x1, " ", y1, "L", x2, " ", y2].concat(),
+            });
         }
-        let attributes = format!("{look} x1=\"{x1}\" y1=\"{y1}\" x2=\"{x2}\" y2=\"{y2}\"");
-        Some(Stroke::Element { name: "line", attributes })
+        look.extend([" x1=\"", x1, "\" y1=\"", y1, "\" x2=\"", x2, "\" y2=\"", y2, "\""]);
+        Some(Stroke::Element { name: "line", attributes: look })
     }
 
     /// The path of a stroke, at mitred ends with a little of the one that goes on there: what joins the two is the corner of both.
@@ -307,6 +317,28 @@ impl<'a> Strokes<'a> {
             definitions.push_str("</linearGradient>\n");
             next
         })
+    }
+}
+
+/// Some numbers as they are written, in one string.
+struct Texts<const N: usize> {
+    text: String,
+    ends: [usize; N],
+}
+
+impl<const N: usize> Texts<N> {
+    fn new(numbers: [f64; N]) -> Texts<N> {
+        let mut text = String::with_capacity(ROOM);
+        let ends = numbers.map(|x| {
+            number::push(&mut text, x, DECIMALS);
+            text.len()
+        });
+        Texts { text, ends }
+    }
+
+    fn all(&self) -> [&str; N] {
+        let mut start = 0;
+        self.ends.map(|end| &self.text[std::mem::replace(&mut start, end)..end])
     }
 }
 

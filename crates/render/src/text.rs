@@ -13,9 +13,14 @@ pub(super) struct Text {
     len: usize,
 }
 
-/// Builds one line.
-pub(super) struct LineWriter<'t> {
-    buffer: &'t mut [u8; LineWriter::SIZE],
+/// Room for a line of six corners, or three numbers, and a few bytes more than that.
+const LINE: usize = 192;
+/// Room for a number.
+const NUMBER: usize = 32;
+
+/// Builds one line, or a number.
+pub(super) struct LineWriter<'t, const SIZE: usize = LINE> {
+    buffer: &'t mut [u8; SIZE],
     len: usize,
 }
 
@@ -37,7 +42,7 @@ impl Text {
 
     /// Appends what is written to a line.
     pub(super) fn line(&mut self, write: impl FnOnce(&mut LineWriter)) {
-        self.reserve(LineWriter::SIZE);
+        self.reserve(LINE);
         let Some(buffer) = self.bytes[self.len..].first_chunk_mut() else { return };
         let mut line = LineWriter { buffer, len: 0 };
         write(&mut line);
@@ -96,32 +101,18 @@ impl Text {
     }
 }
 
-/// A number as [`number::push`] writes it.
-pub(super) struct Quick {
-    buffer: [u8; LineWriter::SIZE],
-    len: usize,
-}
-
-impl Quick {
-    pub(super) fn as_str(&self) -> &str {
-        std::str::from_utf8(&self.buffer[..self.len]).unwrap_or_default()
-    }
-}
-
-/// A number rounded to so many decimals, if that is quickly done.
-pub(super) fn quick(x: f64, decimals: usize) -> Option<Quick> {
-    let fixed = Fixed::new(x, *POWERS.get(decimals)?)?;
-    let mut buffer = [0; LineWriter::SIZE];
+/// Appends a number rounded to so many decimals, as [`number::push`] does, if that is quickly done; else false.
+pub(super) fn push_quickly(out: &mut String, x: f64, decimals: usize) -> bool {
+    let Some(fixed) = POWERS.get(decimals).and_then(|power| Fixed::new(x, *power)) else { return false };
+    let mut buffer = [0; NUMBER];
     let mut line = LineWriter { buffer: &mut buffer, len: 0 };
     line.fixed(fixed, decimals);
     let len = line.len;
-    Some(Quick { buffer, len })
+    out.push_str(std::str::from_utf8(&buffer[..len]).unwrap_or_default());
+    true
 }
 
-impl LineWriter<'_> {
-    /// Room for six corners, or three numbers, and a few bytes more than that.
-    const SIZE: usize = 192;
-
+impl<const SIZE: usize> LineWriter<'_, SIZE> {
     pub(super) fn byte(&mut self, byte: u8) {
         self.buffer[self.len] = byte;
         self.len += 1;
@@ -142,26 +133,20 @@ impl LineWriter<'_> {
         self.byte(b'\n');
     }
 
-    /// Appends the first `len` of eight bytes.
-    fn chunk(&mut self, bytes: u64, len: usize) {
-        self.buffer[self.len..self.len + 8].copy_from_slice(&bytes.to_le_bytes());
-        self.len += len;
-    }
-
     fn fixed(&mut self, number: Fixed, decimals: usize) {
         self.buffer[self.len] = b'-';
-        self.len += usize::from(number.negative);
+        let start = self.len + usize::from(number.negative);
         let digits = digits(number.digits);
-        // Digits of the whole part, at least one.
+        // Digits of the whole part, at least one, and those behind the point.
         let whole = 8 - decimals;
         let skipped = (digits.trailing_zeros() as usize / 8).min(whole - 1);
-        let ascii = digits | ZEROS;
-        self.chunk(ascii >> (8 * skipped), whole - skipped);
-        let trailing = digits.leading_zeros() as usize / 8;
-        if trailing < decimals {
-            self.byte(b'.');
-            self.chunk(ascii >> (8 * whole), decimals - trailing);
-        }
+        let behind = decimals.saturating_sub(digits.leading_zeros() as usize / 8);
+        let width = whole - skipped;
+        let ascii = u128::from(digits | ZEROS);
+        let front = ascii >> (8 * skipped) & ((1 << (8 * width)) - 1);
+        let text = front | u128::from(b'.') << (8 * width) | ascii >> (8 * whole) << (8 * width + 8);
+        self.buffer[start..start + 16].copy_from_slice(&text.to_le_bytes());
+        self.len = start + width + if behind > 0 { behind + 1 } else { 0 };
     }
 }
 
@@ -220,21 +205,33 @@ struct Fixed {
 }
 
 impl Fixed {
-    /// `None` where the integer might be another than that of the exact decimals: it is too large, or the number is
-    /// nearly half way between two.
+    /// `None` if it is too large.
     fn new(x: f64, power: f64) -> Option<Fixed> {
         let scaled = x.abs() * power;
         if scaled.is_nan() || scaled >= LIMIT as f64 - 1.0 {
             return None;
         }
         let below = scaled as u32;
-        let rest = scaled - f64::from(below);
+        let mut rest = scaled - f64::from(below);
         // The product is wrong by 1e-8 at most.
         if (rest - 0.5).abs() < 1e-7 {
-            return None;
+            rest = 0.5 + half_way(x, power, below, rest);
         }
         let digits = u64::from(below) + u64::from(rest > 0.5);
         Some(Fixed { negative: x < 0.0 && digits > 0, digits })
+    }
+}
+
+/// Where a number whose last decimals are nearly half way between two goes: 0.5 for up. Half way exactly it goes to the even one.
+#[cold]
+fn half_way(x: f64, power: f64, below: u32, rest: f64) -> f64 {
+    // What the rounding of the product has taken away; less than what `rest` differs from a half, unless that is nothing.
+    let error = x.abs().mul_add(power, -(x.abs() * power));
+    let excess = if rest == 0.5 { error } else { rest - 0.5 };
+    match excess == 0.0 {
+        true if below % 2 == 1 => 0.5,
+        true => -0.5,
+        false => 0.5f64.copysign(excess),
     }
 }
 
@@ -272,6 +269,10 @@ mod tests {
             let [x, y, z] = [v.x, v.y, v.z].map(|x| slow(x, decimals));
             let expected = format!("before\nvn {x} {y} {z}\n");
             assert_eq!(String::from_utf8_lossy(text.bytes()), expected, "{v:?} {decimals}");
+            let mut pushed = String::new();
+            if push_quickly(&mut pushed, v.x, decimals) {
+                assert_eq!(pushed, x);
+            }
         };
         let mut state = 1_u64;
         for i in 0..100_000 {
@@ -284,6 +285,15 @@ mod tests {
             });
             for decimals in [0, 2, 3, 4, 6, 7, 9, 12] {
                 check(v, decimals);
+            }
+        }
+        // Half way between two, exactly or nearly.
+        for k in 0..20_000_u32 {
+            for decimals in [0, 2, 3, 7] {
+                let half = (f64::from(k) + 0.5) / POWERS[decimals];
+                check(Vector::new(half, -half.next_up(), half.next_down()), decimals);
+                let binary = f64::from(k) / 1024.0;
+                check(Vector::new(binary, -binary.next_up(), 1e4 + binary), decimals);
             }
         }
         for x in [f64::NAN, f64::INFINITY, -1e300, -0.0, 0.5, 2.5, 99_999_999.0, 9.999_999_6, 1e8] {

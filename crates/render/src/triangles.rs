@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use super::tube::{TubeStyle, Tubes};
 use super::{Fit, triangulate};
-use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene, Segment, Surface, Vector};
+use dlsys_geometry::scene::{Face, MaterialId, OwnerId, Point, Scene, Segment, Surface, Vector};
 
 /// Takes vertices and normals, in the order of their numbers.
 pub(super) trait Points {
@@ -30,6 +30,13 @@ pub(super) trait Faces {
     /// A triangle under a picture: of each corner also the number of its place in that.
     fn pictured(&mut self, corners: [(u32, u32); 3], _places: [u32; 3]) {
         self.face(corners);
+    }
+
+    /// Triangles of a mesh of so many vertices, each with the normal of its number, from the first vertex and normal on.
+    fn mesh(&mut self, [vertex, normal]: [u32; 2], _vertices: usize, faces: &[Face]) {
+        for face in faces {
+            self.face(face.corners.map(|k| (vertex + k, normal + k)));
+        }
     }
 
     /// The side between two rings of as many corners, the second one further along. At a point a side has one triangle.
@@ -297,12 +304,13 @@ impl<'s> Solid<'s> {
             Item::Surface(i) => {
                 let [vertex, normal, place] = self.surfaces[i];
                 let mesh = &self.placed[i].mesh;
-                for face in &mesh.faces[run.faces.clone()] {
+                let faces = &mesh.faces[run.faces.clone()];
+                if mesh.places.is_empty() {
+                    return out.mesh([vertex, normal], mesh.vertices.len(), faces);
+                }
+                for face in faces {
                     let corners = face.corners.map(|k| (vertex + k, normal + k));
-                    match mesh.places.is_empty() {
-                        true => out.face(corners),
-                        false => out.pictured(corners, face.corners.map(|k| place + k)),
-                    }
+                    out.pictured(corners, face.corners.map(|k| place + k));
                 }
             }
         }

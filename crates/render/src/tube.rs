@@ -123,14 +123,14 @@ impl<'s> Tubes<'s> {
         kept: impl Fn(usize) -> bool,
     ) -> Tubes<'s> {
         let segments = &scene.segments[..];
+        let (profiles, collars, pieces) = Default::default();
+        let mut tubes = Tubes { segments, profiles, collars, pieces, counts: [0; 2] };
+        let count = (0..segments.len()).filter(|i| kept(*i)).count();
+        if count == 0 {
+            return tubes;
+        }
         let structure = Structure::of(segments, style.default_width, &kept);
-        let mut tubes = Tubes {
-            segments,
-            profiles: Vec::new(),
-            collars: Vec::new(),
-            pieces: Vec::with_capacity(segments.len()),
-            counts: [0; 2],
-        };
+        tubes.pieces.reserve(count);
         let mut profiles: HashMap<(Option<u32>, usize), usize> = HashMap::new();
         let (mut members, mut parts) = (Vec::new(), Vec::new());
         let firsts =

@@ -9,7 +9,7 @@ use crate::kernel::Simulation;
 use crate::schedule::is_before;
 use dlsys_tree::SimTime;
 
-/// Where [`Simulation::pass_some`] has stopped.
+/// Where [`Simulation::pass_some`] or [`Simulation::pass_piece`] has stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Passed {
     /// Nothing comes before the time that was asked for.
@@ -42,6 +42,25 @@ impl Simulation<'_> {
             }
         }
         Ok(Passed::Some)
+    }
+
+    /// Lets time pass up to `t`, as [`Simulation::pass`], in pieces: stops after so many entries of the queues, or where many productions were
+    /// computed at once. The fastest way; how large a piece is, depends on the model.
+    ///
+    /// # Errors
+    /// As of [`Simulation::pass`].
+    pub fn pass_piece(&mut self, t: f64, entries: usize) -> Result<Passed, Error> {
+        self.guarded(|simulation| {
+            for _ in 0..entries {
+                if simulation.pass_chains(t) {
+                    return Ok(Passed::Some);
+                }
+                if simulation.advance_once(t)?.is_none() {
+                    return Ok(Passed::All);
+                }
+            }
+            Ok(Passed::Some)
+        })
     }
 
     /// True if nothing has been passed that comes after `t`: then [`Simulation::at`] may be asked for `t`, though

@@ -116,6 +116,8 @@ pub struct Settings {
     /// More bytes of memory than this, of the process as a whole where the system tells them, are an error. By
     /// default only as much as the system does not have.
     pub max_memory: u64,
+    /// Threads that compute the lives of modules that read no others. Results do not depend on it.
+    pub threads: usize,
     /// Productions are recorded for [`Simulation::take_events`].
     pub log: bool,
     /// Disables the fast path (differential tests).
@@ -142,6 +144,7 @@ impl Default for Settings {
             max_events: Settings::EVENTS,
             max_seconds: f64::INFINITY,
             max_memory: u64::MAX,
+            threads: 1,
             log: false,
             slow: false,
             transitions: false,

@@ -1,9 +1,9 @@
 //! Chains of lives against the queue: random models whose modules are replaced one by one, some of them by several modules, by none or
-//! by chance. [`Simulation::pass_some`] takes every production from the queue, [`Simulation::at`] makes chains of them: the states, the
-//! logs and the counts must be the same bits.
+//! by chance. [`Simulation::pass_some`] takes every production from the queue, [`Simulation::at`] makes chains of them, on one thread or on
+//! several: the states, the logs and the counts must be the same bits.
 
 use dlsys_session::Session;
-use dlsys_sim::{Error, Event, Settings, Simulation, Stats};
+use dlsys_sim::{Error, Event, Passed, Settings, Simulation, Stats};
 use proptest::prelude::*;
 
 /// A kind of the model: how a module grows, when it is replaced, and by what.
@@ -82,15 +82,24 @@ fn text(n: usize, apart: f64, kinds: &[Kind]) -> String {
 /// Everything that a run gives: at some times the bits of the state and the counts, and the log or the error.
 type Record = (Vec<(Vec<u64>, Stats)>, Vec<Event>, Option<String>);
 
-/// Runs a model by the queue or by chains; returns also how many productions were those of chains.
-fn run(session: &Session, settings: Settings, times: &[f64], by_queue: bool) -> (Record, u64) {
+/// How time passes.
+#[derive(Clone, Copy)]
+enum Way {
+    Queue,
+    Chains,
+    /// Chains, with a pause after each of them.
+    Pieces,
+}
+
+/// Runs a model; returns also how many productions were those of chains.
+fn run(session: &Session, settings: Settings, times: &[f64], way: Way) -> (Record, u64) {
     let mut simulation = match session.simulate(settings) {
         Ok(simulation) => simulation,
         Err(error) => return ((Vec::new(), Vec::new(), Some(error.to_string())), 0),
     };
     let (mut states, mut failed) = (Vec::new(), None);
     for &t in times {
-        match state(&mut simulation, t, by_queue) {
+        match state(&mut simulation, t, way) {
             Ok(bits) => states.push((bits, simulation.stats())),
             Err(error) => {
                 states.push((Vec::new(), simulation.stats()));
@@ -103,9 +112,13 @@ fn run(session: &Session, settings: Settings, times: &[f64], by_queue: bool) -> 
     ((states, simulation.take_events(), failed), chained)
 }
 
-fn state(simulation: &mut Simulation, t: f64, by_queue: bool) -> Result<Vec<u64>, Error> {
-    if by_queue {
-        simulation.pass_some(t, usize::MAX, false)?;
+fn state(simulation: &mut Simulation, t: f64, way: Way) -> Result<Vec<u64>, Error> {
+    match way {
+        Way::Queue => {
+            simulation.pass_some(t, usize::MAX, false)?;
+        }
+        Way::Chains => {}
+        Way::Pieces => while simulation.pass_piece(t, 100)? != Passed::All {},
     }
     let mut string = Default::default();
     simulation.at(t, &mut string)?;
@@ -117,19 +130,25 @@ fn state(simulation: &mut Simulation, t: f64, by_queue: bool) -> Result<Vec<u64>
     Ok(string.iter().flat_map(module).collect())
 }
 
-/// Runs both ways and compares; returns how many productions were those of chains.
-fn compare(text: &str, settings: Settings, times: &[f64]) -> u64 {
+/// Runs by the queue, and by chains on so many threads, and compares; returns how many productions were those of chains.
+fn compare(text: &str, settings: Settings, times: &[f64], threads: &[usize]) -> u64 {
     let session = Session::from_text("chains.dls", text, &[]).unwrap_or_else(|e| panic!("{text}\n{e:?}"));
-    let (queue, none) = run(&session, settings, times, true);
-    let (chains, chained) = run(&session, settings, times, false);
+    let (queue, none) = run(&session, settings, times, Way::Queue);
     assert_eq!(none, 0);
-    assert_eq!(queue.2, chains.2, "{text}");
-    for (i, (a, b)) in queue.1.iter().zip(&chains.1).enumerate() {
-        assert_eq!(a, b, "production {i} of\n{text}");
+    let mut least = u64::MAX;
+    for &threads in threads {
+        let way = if threads == 2 { Way::Pieces } else { Way::Chains };
+        let (chains, chained) = run(&session, Settings { threads, ..settings }, times, way);
+        assert_eq!(queue.2, chains.2, "{threads} threads, {text}");
+        for (i, (a, b)) in queue.1.iter().zip(&chains.1).enumerate() {
+            assert_eq!(a, b, "production {i}, {threads} threads, of\n{text}");
+        }
+        assert_eq!(queue.1.len(), chains.1.len(), "{threads} threads, {text}");
+        let ends = [queue.0.last(), chains.0.last()];
+        assert!(queue.0 == chains.0, "states, {threads} threads, of\n{text}\n{ends:?}");
+        least = least.min(chained);
     }
-    assert_eq!(queue.1.len(), chains.1.len(), "{text}");
-    assert!(queue.0 == chains.0, "states of\n{text}\n{:?}\n{:?}", queue.0.last(), chains.0.last());
-    chained
+    least
 }
 
 fn kind() -> impl Strategy<Value = Kind> {
@@ -159,10 +178,11 @@ proptest! {
         log in any::<bool>(),
         frames in 1..9usize,
         most in prop_oneof![Just(10_000_000_000u64), 500..6000u64],
+        threads in 1..4usize,
     ) {
         let settings = Settings { log, max_modules: 3000, max_events: most, ..Settings::default() };
         let times: Vec<f64> = (1..=frames).map(|k| 20.0 * k as f64 / frames as f64).collect();
-        compare(&text(n, apart, &kinds), settings, &times);
+        compare(&text(n, apart, &kinds), settings, &times, &[threads]);
     }
 }
 
@@ -176,7 +196,7 @@ fn most_productions_of_plain_lives_are_in_chains() {
     for (growth, level, successor) in [(0, 1, 1), (3, 0, 2), (5, 3, 5), (6, 2, 6)] {
         for log in [false, true] {
             let text = text(300, 0.123_456_789, &vec![lives(growth, level, successor); KINDS]);
-            let chained = compare(&text, Settings { log, ..Settings::default() }, &[40.0]);
+            let chained = compare(&text, Settings { log, ..Settings::default() }, &[40.0], &[1, 2, 3]);
             assert!(chained > 3000, "{chained} of\n{text}");
         }
     }
@@ -190,7 +210,7 @@ fn an_error_is_found_where_the_queue_finds_it() {
         A(x, p, k):\n  if x < 1 + p solve dx/dt = 1\n  \
         if x = 1 + p produce A(0, 4*p*(1 - p) + (if k = 5150 then 1/(k - 5150) else 0), k + 1000)\n";
     for times in [&[30.0][..], &[3.0, 4.5, 30.0]] {
-        let chained = compare(text, Settings { log: true, ..Settings::default() }, times);
+        let chained = compare(text, Settings { log: true, ..Settings::default() }, times, &[1, 2, 3]);
         assert!(chained > 500, "{chained}");
     }
 }

@@ -1,6 +1,6 @@
 //! First pass over the text: the boundaries of declarations and the significant line breaks.
 //!
-//! Comments and line breaks that end nothing become spaces; all other bytes keep their places, so that every position
+//! Comments, line breaks that end nothing, tabs and the like become spaces; all other bytes keep their places, so that every position
 //! in the result is a position in the file. The text is cut into items (declarations and rules), so that a mistake in
 //! one does not hide those in the others, and so that the parser's memory is bounded by an item, not by the file.
 //! Nesting is bounded here, before any recursive pass.
@@ -15,6 +15,7 @@ mod tokens;
 
 use crate::declarations::{Begins, Body, Declaration};
 use crate::lexeme::{Lexeme, SUBSCRIPTED, Token, has_subscript, in_name, number_length};
+use ahead::is_space;
 use dlsys_diagnostic::{Diagnostic, Span};
 
 /// Deepest nesting of parentheses, signs, powers and `if` that an expression may have.
@@ -193,6 +194,18 @@ fn scan(text: &str, lexemes: Option<Vec<Lexeme>>) -> (Layout, Option<Vec<Lexeme>
     (Layout { text, items, errors }, lexemes)
 }
 
+/// A text in which all that stands for a space is one, at the same places. Not for texts with strings in quotes.
+pub fn with_spaces(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match is_space(c) {
+            true => out.extend(std::iter::repeat_n(' ', c.len_utf8())),
+            false => out.push(c),
+        }
+    }
+    out
+}
+
 fn memchr_newline(text: &str, from: usize) -> usize {
     text[from..].find('\n').map_or(text.len(), |i| from + i)
 }
@@ -213,7 +226,12 @@ impl Scanner<'_> {
                 chars.peek().map_or(line.len(), |(j, _)| *j)
             };
             let (token, to) = match c {
-                c if c.is_whitespace() => continue,
+                c if c.is_whitespace() => {
+                    if is_space(c) {
+                        self.out[start + i..start + i + c.len_utf8()].fill(b' ');
+                    }
+                    continue;
+                }
                 '#' => {
                     self.out[start + i..end].fill(b' ');
                     break;

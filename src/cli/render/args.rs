@@ -130,7 +130,7 @@ pub struct RenderArgs {
     /// More bytes than this, in all files of the render, are an error, such as 500MB
     #[arg(long, value_name = "BYTES", default_value = "10GB", value_parser = bytes)]
     pub max_output: u64,
-    /// Number of threads that draw and write during the simulation, with no effect on the files [default: one for each core]
+    /// Number of threads that compute, draw and write, with no effect on the files [default: one for each core]
     #[arg(long, value_name = "N", value_parser = threads)]
     pub threads: Option<usize>,
     /// Write into a directory that holds other files

@@ -28,7 +28,7 @@ pub(super) fn usage(message: impl std::fmt::Display) -> Failure {
 /// `dlsys render MODEL --format webp -o FILE`.
 pub fn render(args: &RenderArgs, format: Format, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
     check(args, format)?;
-    let mut run = ModelRun::start(&args.shared)?;
+    let mut run = ModelRun::start(&args.shared)?.on_threads(args.threads);
     run.detail = flags::detail(args, render::Format::PNG);
     render_run(args, format, run, stale)
 }

@@ -1,7 +1,7 @@
 //! Values of the flags of `render`, and combinations that are refused.
 
 use crate::cli::args::RenderArgs;
-use crate::cli::common::Failure;
+use crate::cli::common::{Failure, cores};
 use crate::cli::shared::Topology;
 use crate::cli::values::{Background, LineWidth, Sky};
 use crate::render::{CAMERA_SHAPE, Content, Fit, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
@@ -143,7 +143,7 @@ pub fn of_layouts(args: &RenderArgs) -> Result<(), Failure> {
 }
 
 pub fn threads(args: &RenderArgs) -> usize {
-    args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from))
+    args.threads.unwrap_or_else(cores)
 }
 
 pub fn spacing(args: &RenderArgs) -> Spacing {

@@ -53,7 +53,7 @@ fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Fail
     };
     flags::survey(args)?;
     flags::agree(args, format)?;
-    let mut run = ModelRun::start(&args.shared)?;
+    let mut run = ModelRun::start(&args.shared)?.on_threads(args.threads);
     run.detail = flags::detail(args, format);
     match args.seeds {
         Some(seeds) => specimens(args, format, run, seeds),

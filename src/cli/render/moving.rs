@@ -21,7 +21,7 @@ const LARGE: usize = 20_000_000;
 /// `dlsys render MODEL --format asvg -o FILE`.
 pub fn render(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
     check(args)?;
-    let run = ModelRun::start(&args.shared)?;
+    let run = ModelRun::start(&args.shared)?.on_threads(args.threads);
     render_run(args, run, stale)
 }
 

@@ -12,6 +12,7 @@ use super::variability::Constants;
 use crate::declared::{DeclaredSolve, ResolvedRule};
 
 /// The results of the analysis of the equations of a clause.
+#[derive(Clone)]
 pub struct ClauseAnalysis {
     of: Vec<usize>,
     rates: Program,

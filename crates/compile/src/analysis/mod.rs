@@ -25,6 +25,8 @@ mod solution_forms;
 mod stepping;
 mod variability;
 
+use std::collections::HashMap;
+
 use dlsys_expr::{Graph, NodeId, Program};
 use dlsys_model::{Aggregate, Jacobian, Kinds, Pulses, Rule, ZeroCrossing};
 
@@ -52,14 +54,27 @@ pub fn analyse(graph: &mut Graph, kinds: &Kinds, rules: Vec<ResolvedRule>) -> An
     let aggregates: Vec<Vec<Aggregate>> =
         rules.iter().enumerate().map(|(i, rule)| aggregates(graph, &moving, i, rule)).collect();
     let needed = need::needed(graph, kinds, &rules);
-    let found: Vec<RuleAnalysis> = (rules.iter().enumerate())
-        .map(|(i, rule)| {
-            let of: Vec<usize> =
-                kinds.iter().filter(|(_, k)| k.rules.contains(&i)).map(|(id, _)| id.index()).collect();
-            let is_needed = |p: usize| of.iter().any(|kind| needed.contains(&(*kind, p)));
-            analyse_rule(graph, rule, moving.context(i), &is_needed)
-        })
-        .collect();
+    let mut kinds_of: Vec<Vec<usize>> = vec![Vec::new(); rules.len()];
+    for (id, kind) in kinds.iter() {
+        kind.rules.iter().for_each(|rule| kinds_of[*rule].push(id.index()));
+    }
+    let mut found: Vec<RuleAnalysis> = Vec::with_capacity(rules.len());
+    let mut known: HashMap<Shape, usize> = HashMap::new();
+    for (i, rule) in rules.iter().enumerate() {
+        let shape = Shape::of(rule, moving.context(i));
+        let like = shape.as_ref().and_then(|shape| known.get(shape));
+        let analysis = match like {
+            Some(like) => found[*like].clone(),
+            None => {
+                let is_needed = |p: usize| kinds_of[i].iter().any(|kind| needed.contains(&(*kind, p)));
+                analyse_rule(graph, rule, moving.context(i), &is_needed)
+            }
+        };
+        found.push(analysis);
+        if let Some(shape) = shape {
+            known.entry(shape).or_insert(i);
+        }
+    }
     let pulses = pulses::find(graph, kinds, &rules, &found, &moving);
     let drawn_only = need::drawn_only(graph, kinds, &rules);
     let parts = rules.into_iter().zip(found).zip(aggregates).zip(pulses).enumerate();
@@ -74,7 +89,40 @@ pub fn analyse(graph: &mut Graph, kinds: &Kinds, rules: Vec<ResolvedRule>) -> An
     Analysed { rules, drawn_only }
 }
 
+/// All that the analysis of a rule depends on: rules that differ in names only have the same expressions, and are analysed once.
+#[derive(PartialEq, Eq, Hash)]
+struct Shape {
+    own: usize,
+    variables: usize,
+    sides: Vec<(NodeId, NodeId)>,
+    /// By clause: parameters with their rates, and the number of switches.
+    clauses: Vec<(Vec<(usize, NodeId)>, usize)>,
+    /// The parameters that are clocks.
+    clocks: Vec<usize>,
+    moving: Vec<bool>,
+}
+
+impl Shape {
+    /// None if it depends on more: which values and implicit equations are needed, and where they stand in the text.
+    fn of(rule: &ResolvedRule, moving: &[bool]) -> Option<Shape> {
+        let declared = &rule.declared;
+        if declared.algebraic().next().is_some() {
+            return None;
+        }
+        let clauses = declared.solves.iter().map(|solve| (solve.rates.clone(), solve.switches.len()));
+        Some(Shape {
+            own: declared.own(),
+            variables: declared.variables,
+            sides: declared.sides.clone(),
+            clauses: clauses.collect(),
+            clocks: declared.clocks.iter().map(|clock| clock.parameter).collect(),
+            moving: moving.to_vec(),
+        })
+    }
+}
+
 /// The results of the analysis of one rule.
+#[derive(Clone)]
 pub struct RuleAnalysis {
     zero_crossings_at_rest: Vec<ZeroCrossing>,
     reads_context: bool,

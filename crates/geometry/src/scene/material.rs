@@ -52,7 +52,13 @@ impl Color {
 impl fmt::Display for Color {
     /// `#rrggbb`
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "#{:02x}{:02x}{:02x}", self.red, self.green, self.blue)
+        const DIGITS: &[u8; 16] = b"0123456789abcdef";
+        let mut text = *b"#rrggbb";
+        for (digits, channel) in text[1..].chunks_exact_mut(2).zip([self.red, self.green, self.blue]) {
+            digits[0] = DIGITS[usize::from(channel >> 4)];
+            digits[1] = DIGITS[usize::from(channel & 15)];
+        }
+        f.write_str(std::str::from_utf8(&text).unwrap_or_default())
     }
 }
 

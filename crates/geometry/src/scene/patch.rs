@@ -212,18 +212,23 @@ fn tessellate(net: &Net, accuracy: f64, steps: Steps, paint: Paint, mesh: &mut M
         (0..=columns).map(|i| Column::new(net, i as f64 / columns as f64)).collect();
     let mut numbers = vec![u32::MAX; (columns + 1) * (rows + 1)];
     let mut number = |i: usize, j: usize, mesh: &mut Mesh| {
-        let ((mut i, mut u), (mut j, mut v)) = ((i, i as f64 / columns as f64), (j, j as f64 / rows as f64));
+        let (mut i, mut j) = (i, j);
+        let (mut along, mut across) = (None, None);
         if j == 0 || j == rows {
-            (i, u) = snap(i, columns, if j == 0 { bottom } else { top });
+            let (snapped, u) = snap(i, columns, if j == 0 { bottom } else { top });
+            (i, along) = (snapped, Some(u));
         }
         if i == 0 || i == columns {
-            (j, v) = snap(j, rows, if i == 0 { left } else { right });
+            let (snapped, v) = snap(j, rows, if i == 0 { left } else { right });
+            (j, across) = (snapped, Some(v));
         }
         let place = &mut numbers[j * (columns + 1) + i];
         if *place == u32::MAX {
             *place = mesh.vertices.len() as u32;
-            // Within the grid, u is that of the column.
-            let column = columns_of.get(i).filter(|_| j > 0 && j < rows);
+            let u = along.unwrap_or_else(|| i as f64 / columns as f64);
+            let v = across.unwrap_or_else(|| j as f64 / rows as f64);
+            // On an edge it may be another one than that of the column.
+            let column = columns_of.get(i).filter(|column| column.u == u);
             let found = column.map(|column| column.at(net, u, v));
             let (point, normal) = found.unwrap_or_else(|| (point(net, u, v), normal(net, u, v)));
             mesh.vertices.push(point);
@@ -256,6 +261,7 @@ fn tessellate(net: &Net, accuracy: f64, steps: Steps, paint: Paint, mesh: &mut M
 /// The curve of a patch at one parameter along its rows: the control points of the curve, and of its slope across. Sums are those of
 /// [`point`] and [`normal`], to the last bit.
 struct Column {
+    u: f64,
     points: [Vector; 4],
     slopes: [Vector; 4],
 }
@@ -265,7 +271,7 @@ impl Column {
         let of = |weights: [f64; 4]| {
             net.map(|row| row.iter().zip(weights).fold(Vector::zeros(), |along, (p, u)| along + p.coords * u))
         };
-        Column { points: of(weights(u)), slopes: of(slopes(u)) }
+        Column { u, points: of(weights(u)), slopes: of(slopes(u)) }
     }
 
     /// Place and normal at a parameter along the curve.

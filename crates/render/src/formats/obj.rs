@@ -14,7 +14,7 @@ use crate::name::{Names, pictures};
 use crate::text::{Corner, Text};
 use crate::triangles::{Faces, Points, Ring, Solid};
 use crate::{GENERATOR, Page, floor, number, relay};
-use dlsys_geometry::scene::{MaterialId, OwnerId, Palette, Picture, Point, Scene, Texture, Vector};
+use dlsys_geometry::scene::{Face, MaterialId, OwnerId, Palette, Picture, Point, Scene, Texture, Vector};
 
 /// Name of the material library that all frames refer to.
 const MATERIALS: &str = "materials.mtl";
@@ -182,6 +182,8 @@ struct Draft {
     text: Text,
     low: Corners,
     high: Corners,
+    /// Those of a mesh.
+    mesh: Vec<Corner>,
 }
 
 /// Corners of a ring, the first one once more after the last.
@@ -229,6 +231,21 @@ impl Faces for Draft {
     fn face(&mut self, corners: [(u32, u32); 3]) {
         let [a, b, c] = corners.map(|(vertex, normal)| Corner::new(vertex, normal));
         self.text.line(|line| line.face([&a, &b, &c]));
+    }
+
+    fn mesh(&mut self, [vertex, normal]: [u32; 2], vertices: usize, faces: &[Face]) {
+        if 3 * faces.len() <= vertices {
+            for face in faces {
+                self.face(face.corners.map(|k| (vertex + k, normal + k)));
+            }
+            return;
+        }
+        self.mesh.clear();
+        self.mesh.extend((0..vertices as u32).map(|k| Corner::new(vertex + k, normal + k)));
+        for face in faces {
+            let [a, b, c] = face.corners.map(|k| &self.mesh[k as usize]);
+            self.text.line(|line| line.face([a, b, c]));
+        }
     }
 
     fn pictured(&mut self, corners: [(u32, u32); 3], places: [u32; 3]) {

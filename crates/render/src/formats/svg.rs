@@ -28,9 +28,9 @@ impl Exporter for Svg {
         let sky = Sky::of(scene, &fit, &page);
         let (scene, floor) = floor::added(scene, &fit, Some(&page));
         let style = Style { floor, ..style(&fit, &page) };
-        out.write_all(
-            around(&page, title, sky.as_ref(), painter::elements(&scene, style, true, "")).as_bytes(),
-        )
+        let elements = painter::elements(&scene, style, true, "");
+        let parts = around(&page, title, sky.as_ref(), elements);
+        parts.iter().try_for_each(|part| out.write_all(part.as_bytes()))
     }
 }
 
@@ -40,8 +40,11 @@ pub(crate) fn style<'a>(fit: &'a Fit, page: &Page) -> Style<'a> {
     Style { fit, scale: page.picture.scale, pixels, background: page.background, floor: None }
 }
 
-/// The document of a page with these elements, each with its line's end. A sky stands in place of the background.
-pub(crate) fn around(page: &Page, title: &str, sky: Option<&Sky>, mut elements: String) -> String {
+/// The document of a page with these elements, each with its line's end, in parts: elements are most of it, and are not copied. A sky stands in
+/// place of the background.
+pub(crate) fn around(page: &Page, title: &str, sky: Option<&Sky>, mut elements: String) -> [String; 3] {
+    /// Stands for the elements; no title holds such a character.
+    const HERE: &str = "\u{1}";
     let view_box = page.picture.view_box();
     let [left, top, width, height] = view_box;
     elements.truncate(elements.trim_end().len());
@@ -74,8 +77,8 @@ pub(crate) fn around(page: &Page, title: &str, sky: Option<&Sky>, mut elements: 
         document = document.add(background);
     }
     let things =
-        Group::new().set("stroke-linecap", "round").set("stroke-linejoin", "round").add(Blob::new(elements));
-    let mut out = document.add(things).to_string();
-    out.push('\n');
-    out
+        Group::new().set("stroke-linecap", "round").set("stroke-linejoin", "round").add(Blob::new(HERE));
+    let document = document.add(things).to_string();
+    let (before, after) = document.split_once(HERE).unwrap_or((&document, ""));
+    [before.to_owned(), elements, format!("{after}\n")]
 }

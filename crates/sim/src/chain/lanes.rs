@@ -2,15 +2,16 @@
 //! same functions on the same numbers, hence to the same bits.
 
 use dlsys_expr::{LANES, Lanes};
-use dlsys_model::{Rule, SolutionForm, ZeroCrossing};
+use dlsys_model::{Rule, Sign, SolutionForm, ZeroCrossing};
 use dlsys_tree::SimTime;
 use smallvec::SmallVec;
 
 use super::law::{Law, is_simple};
-use crate::detect::signs::{rate_at, sign_at_birth};
+use super::straight::{Firsts, NEVER, Newborns, is_linear, is_straight};
+use crate::detect::signs::{NEAR, opposite, rate_at};
 use crate::flow::closed_form::integrated;
 use crate::flow::prediction::{
-    FirstCrossing, Outlives, PredictedCrossing, first_crossing, follows, is_clear, meeting, outlives,
+    FirstCrossing, Outlives, PredictedCrossing, first_crossing, follows, meeting, outlives,
 };
 use crate::scratch::Scratch;
 use crate::trajectory::{Riccati, Trajectory};
@@ -41,6 +42,9 @@ pub struct Block {
     levels: Vec<Lanes>,
     /// By atom: the instants at which the sides meet.
     meetings: Vec<[Option<PredictedCrossing>; LANES]>,
+    firsts: Firsts,
+    /// The classes of the newborns, by lane; none for those that go the general way.
+    alike: [Option<u16>; LANES],
     scratch: Scratch,
 }
 
@@ -62,8 +66,36 @@ fn linear(c: &[Lanes; 4], lane: usize) -> Trajectory {
     Trajectory::Polynomial(integrated(&[c[0][lane]], 0.0))
 }
 
-fn is_linear(law: &SolutionForm) -> bool {
-    matches!(law, SolutionForm::Polynomial(program) if program.outputs() == 1)
+/// The label of the class with the signs of another one whose lives end when the sides of an atom meet, or never.
+#[cold]
+fn label_of_end(lives: &Lives, rule: &Rule, like: &LifeClass, atom: Option<usize>) -> Option<u16> {
+    let LifeClass { solve, signs, .. } = like;
+    let end = match atom {
+        Some(atom) => {
+            let (produce, after) = (follows(rule, signs, atom)?, opposite(signs[atom]));
+            Some(End::Crossing { produce, atom, after })
+        }
+        None => None,
+    };
+    let is_it = |other: &LifeClass| other.end == end && other.solve == *solve && other.signs == *signs;
+    lives.labels_of(rule.index).iter().copied().find(|label| lives.get(*label).is_some_and(is_it))
+}
+
+/// Leaves those lanes true in which the sides of an atom clearly differ and have a sign. The same as
+/// [`is_clear`](crate::flow::prediction::is_clear) and
+/// [`sign_at_birth`](crate::detect::signs::sign_at_birth): sides that clearly differ are not equal.
+#[inline]
+fn has_sign(sign: Sign, [a, b]: [&Lanes; 2], scale: &Lanes, is_like: &mut [bool; LANES]) {
+    let sign = match sign {
+        Sign::Plus => 1.0,
+        Sign::Minus => -1.0,
+        // Those clearly have none.
+        _ => return *is_like = [false; LANES],
+    };
+    for (lane, is_like) in is_like.iter_mut().enumerate() {
+        let gap = sign * (a[lane] - b[lane]);
+        *is_like &= (gap > NEAR * scale[lane].max(a[lane].abs())) & (gap < f64::INFINITY);
+    }
 }
 
 impl Block {
@@ -77,14 +109,14 @@ impl Block {
         self.put_births(rule);
         fates.clear();
         fates.resize(self.count, Fate::General);
-        let mut alike = [label; LANES];
+        self.alike = [label; LANES];
         if label.is_none() {
-            self.classify(lives, rule, &mut alike);
+            self.classify(lives, rule);
         }
         // Nearly always all lanes have one class.
-        while let Some(label) = alike[..self.count].iter().copied().flatten().next() {
+        while let Some(label) = self.alike[..self.count].iter().copied().flatten().next() {
             let mut of_class = [false; LANES];
-            for (like, is_it) in alike.iter_mut().zip(&mut of_class) {
+            for (like, is_it) in self.alike.iter_mut().zip(&mut of_class) {
                 *is_it = *like == Some(label);
                 if *is_it {
                     *like = None;
@@ -92,8 +124,46 @@ impl Block {
             }
             if let Some(class) = lives.get(label).filter(|class| is_simple(rule, class.solve)) {
                 self.evaluate(rule, class.solve);
-                self.decide(lives, rule, (label, class), of_class, fates);
+                match is_straight(class.solve.map(|solve| &rule.solves[solve])) {
+                    true => self.decide_straight(lives, rule, (label, class), &of_class, fates),
+                    false => self.decide(lives, rule, (label, class), of_class, fates),
+                }
             }
+        }
+    }
+
+    /// The lives of those of the modules that have the signs of a class in which nothing is curved.
+    fn decide_straight(
+        &mut self,
+        lives: &Lives,
+        rule: &Rule,
+        (label, class): (u16, &LifeClass),
+        of_class: &[bool; LANES],
+        fates: &mut [Fate],
+    ) {
+        let Block { count, registers, births, coefficients, levels, firsts, .. } = self;
+        firsts.find(rule, class.solve, &Newborns { count: *count, registers, births, coefficients, levels });
+        let usual = match class.end {
+            Some(End::Crossing { atom, .. }) => atom as u32,
+            _ => NEVER,
+        };
+        for (lane, fate) in fates.iter_mut().enumerate() {
+            let (atom, at) = (firsts.atom[lane], firsts.at[lane]);
+            if !of_class[lane] || firsts.general[lane] || atom != NEVER && !at.to_f64().is_finite() {
+                continue;
+            }
+            let label = match atom == usual {
+                true => Some(label),
+                false => {
+                    let atom = Some(atom as usize).filter(|_| atom != NEVER);
+                    label_of_end(lives, rule, class, atom)
+                }
+            };
+            *fate = match label {
+                None => Fate::General,
+                Some(label) if atom == NEVER => Fate::Lasts(label),
+                Some(label) => Fate::Ends(label, at, firsts.level[lane]),
+            };
         }
     }
 
@@ -146,34 +216,30 @@ impl Block {
         }
     }
 
-    /// A class with the signs of each newborn; None if there is none, or they end at birth.
-    fn classify(&mut self, lives: &Lives, rule: &Rule, alike: &mut [Option<u16>; LANES]) {
+    /// Finds a class with the signs of each newborn; none if there is none, or they end at birth.
+    fn classify(&mut self, lives: &Lives, rule: &Rule) {
         let sides: SmallVec<[usize; 8]> = rule.sides.eval_rows(&mut self.registers, self.count).collect();
         let mut scale = [1.0f64; LANES];
         for own in &self.registers[..rule.parameters.len()] {
             scale = std::array::from_fn(|lane| scale[lane].max(own[lane].abs()));
         }
+        let mut open = [true; LANES];
         for &label in lives.labels_of(rule.index) {
             let Some(class) = lives.get(label) else { continue };
-            let mut is_like: [bool; LANES] = std::array::from_fn(|lane| alike[lane].is_none());
+            let mut is_like = open;
             for (side, sign) in sides.chunks(2).zip(&class.signs) {
                 let (a, b) = (&self.registers[side[0]], &self.registers[side[1]]);
-                for lane in 0..self.count {
-                    is_like[lane] &=
-                        is_clear(a[lane], b[lane], scale[lane]) && sign_at_birth(a[lane], b[lane]) == *sign;
-                }
+                has_sign(*sign, [a, b], &scale, &mut is_like);
             }
+            let label = Some(label).filter(|_| !class.is_over_at_birth());
             for lane in 0..self.count {
                 if is_like[lane] {
-                    alike[lane] = Some(label);
+                    (self.alike[lane], open[lane]) = (label, false);
                 }
             }
-            if alike[..self.count].iter().all(Option::is_some) {
+            if !open[..self.count].contains(&true) {
                 break;
             }
-        }
-        for like in alike {
-            *like = like.filter(|label| lives.get(*label).is_some_and(|class| !class.is_over_at_birth()));
         }
     }
 
@@ -206,7 +272,7 @@ impl Block {
         let (clause, watches) = (solve.map(|solve| &rule.solves[solve]), rule.zero_crossings(solve));
         let time = rule.time_variable();
         self.meetings.resize(self.meetings.len().max(watches.len()), [None; LANES]);
-        let Block { count, registers, births, coefficients, levels, meetings, scratch } = self;
+        let Block { count, registers, births, coefficients, levels, meetings, scratch, .. } = self;
         for (atom, (watch, meetings)) in watches.iter().zip(meetings).enumerate() {
             *meetings = [None; LANES];
             let ZeroCrossing::Formula { variable, .. } = watch else { continue };
@@ -286,19 +352,9 @@ impl Block {
         let meet = |atom: usize| self.meetings[atom][lane];
         let FirstCrossing { change, lasting } =
             first_crossing(rule.zero_crossings(*solve), signs, birth, meet)?;
-        let end = match &change {
-            None => None,
-            Some(Change { atom, after, time, .. }) => {
-                if !time.to_f64().is_finite() {
-                    return None;
-                }
-                let produce = match class.end {
-                    Some(End::Crossing { produce, atom: same, .. }) if same == *atom => produce,
-                    _ => follows(rule, signs, *atom)?,
-                };
-                Some(End::Crossing { produce, atom: *atom, after: *after })
-            }
-        };
+        if change.is_some_and(|change| !change.time.to_f64().is_finite()) {
+            return None;
+        }
         let mut lasting = lasting;
         for (law, parameter, c) in laws().filter(|(law, ..)| !is_linear(law)) {
             let trajectory = trajectory(law, c, lane, self.registers[parameter][lane]);
@@ -308,17 +364,11 @@ impl Block {
                 Outlives::Not => return None,
             }
         }
-        let label = match end == class.end {
-            true => label,
-            false => {
-                let is_it = |label: &&u16| {
-                    let other = lives.get(**label);
-                    other.is_some_and(|other| {
-                        other.end == end && other.solve == *solve && other.signs == *signs
-                    })
-                };
-                *lives.labels_of(rule.index).iter().find(is_it)?
-            }
+        let atom = change.map(|change| change.atom);
+        let label = match (atom, class.end) {
+            (Some(atom), Some(End::Crossing { atom: usual, .. })) if atom == usual => label,
+            (None, None) => label,
+            _ => label_of_end(lives, rule, class, atom)?,
         };
         let fate = match change {
             Some(Change { time, level, .. }) => {
@@ -374,5 +424,30 @@ impl Block {
             }
         }
         residuals
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::detect::signs::sign_at_birth;
+    use crate::flow::prediction::is_clear;
+
+    #[test]
+    fn signs_in_lanes_are_those_of_single_modules() {
+        let numbers = [0.0, -0.0, 1.0, 1.0 + 1e-10, 1.0 + 1e-8, -1.0, 1e-12, 5e9, -5e9 - 1.0, 1e300, -1e300]
+            .into_iter()
+            .chain([f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1.7e308, -1.7e308, 5e-324]);
+        let numbers: Vec<f64> = numbers.collect();
+        for (&a, &b) in numbers.iter().flat_map(|a| numbers.iter().map(move |b| (a, b))) {
+            for scale in [1.0, 3e9] {
+                for sign in [Sign::Plus, Sign::Minus, Sign::Zero, Sign::Any, Sign::Undefined] {
+                    let mut found = [true; LANES];
+                    has_sign(sign, [&[a; LANES], &[b; LANES]], &[scale; LANES], &mut found);
+                    let expected = is_clear(a, b, scale) && sign_at_birth(a, b) == sign;
+                    assert_eq!(found, [expected; LANES], "{a} {b} {scale} {sign:?}");
+                }
+            }
+        }
     }
 }

@@ -5,9 +5,10 @@
 //! other up to some time, many lives at once, and only the order of their productions is that of time:
 //!
 //! - [`law`]: of which classes of lives chains are made, and what they need of the model
-//! - [`lanes`]: the lives of some newborns at once, by the functions of `flow::prediction`
+//! - [`lanes`]: the lives of some newborns at once, by the functions of `flow::prediction`; [`straight`]: those without curves
 //! - [`plan`]: the chains of a stretch of time, without a change of anything
 //! - [`order`]: the productions of all chains, sorted
+//! - [`threads`]: both on several threads, as many as [`Settings::threads`](crate::Settings::threads) allows
 //!
 //! The queue of events ([`Schedule`](crate::schedule)) is the general way, and decides whatever is unusual: two productions at nearly one
 //! instant, successors that end at birth, short lives, errors, limits. A plan ends before the first such thing. The results are
@@ -17,16 +18,20 @@ mod lanes;
 mod law;
 mod order;
 mod plan;
+mod straight;
+mod threads;
 
 use crate::kernel::Simulation;
 use crate::log::Event;
 use dlsys_tree::{LastOfChain, SimTime};
 use law::Law;
-use plan::{Course, Plan, Planner};
+use order::Sorted;
+use plan::{Course, Logged, Plan, plans};
 
 /// Productions for which a plan is worth its beginning.
 const FEW: usize = 64;
-/// Productions that a plan should have, by the number of modules; memory and caches limit it.
+/// Productions that a plan should have, by the number of modules; memory and caches limit it. The least is for each thread: threads have to be
+/// started.
 const LEAST: usize = 1 << 14;
 const MOST: usize = 1 << 17;
 /// Productions by the queue before chains are tried, again and at last.
@@ -76,6 +81,14 @@ fn short_of(time: f64) -> f64 {
     if time.is_finite() { time - APART * SimTime::new(time).resolution() } else { time }
 }
 
+/// What happens in a stretch of time: each production once, in order, and what becomes of the modules.
+struct Planned {
+    plans: Vec<Plan>,
+    events: Sorted,
+    /// By entry, if productions are logged.
+    logged: Vec<Logged>,
+}
+
 impl Simulation<'_> {
     /// Passes many productions of chains on the way to `t`; false if that is not worth while.
     #[inline]
@@ -97,7 +110,8 @@ impl Simulation<'_> {
             return false;
         }
         let (since, before) = self.chains.mark;
-        let wanted = (4 * self.schedule.lazy_entries()).clamp(LEAST, MOST).min(room as usize / 2);
+        let least = (LEAST * setup.settings.threads.max(1)).min(MOST);
+        let wanted = (4 * self.schedule.lazy_entries()).clamp(least, MOST).min(room as usize / 2);
         let pace = now.since(since) / (events - before).max(1) as f64;
         let length = self.chains.length.unwrap_or(pace * wanted as f64);
         if !(length > 0.0 && length.is_finite()) {
@@ -113,97 +127,104 @@ impl Simulation<'_> {
             }
             return false;
         }
-        let Some((plan, instants)) = self.plan_chains(until, room) else {
+        let Some(planned) = self.plan_chains(until, room) else {
             self.chains.rest(self.instant.at, events);
             return false;
         };
-        let filled = plan.events.len() as f64 / wanted as f64;
+        let filled = planned.events.len() as f64 / wanted as f64;
         self.chains.length = Some(length / filled.clamp(0.25, 4.0));
         (self.chains.next, self.chains.pause) = (0, FIRST_PAUSE);
-        self.carry_out(plan, instants);
+        self.carry_out(&planned);
         true
     }
 
-    /// A plan for the chains up to a time, or to an earlier one, with its productions sorted and the number of their instants. It is
-    /// complete: what is in it has left the queue. None if there is none with enough productions.
-    fn plan_chains(&mut self, until: f64, room: u64) -> Option<(Plan, u64)> {
+    /// Plans for the chains up to a time, or to an earlier one, with their productions sorted. They are complete: what is in them has left
+    /// the queue. None if there are none with enough productions.
+    fn plan_chains(&mut self, until: f64, room: u64) -> Option<Planned> {
         let laws = Law::all(self.setup.model, &self.world.lives);
-        let mut slots = Vec::new();
-        self.schedule.take_lazy_before(until, &mut slots);
-        // Where newborns are alike, the events after the plan are in the same order then: so the queue has it easy.
-        order::sort_by_time(&mut slots, |(time, _)| *time, |a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut entries = Vec::new();
+        self.schedule.take_lazy_before(until, &mut entries);
+        // Memory is read and written in its order.
+        entries.sort_unstable_by_key(|(_, slot)| *slot);
         let mut limit = until;
-        for &(time, slot) in &slots {
+        for &(time, slot) in &entries {
             let label = self.world.tree.label(self.world.tree.id(slot));
             if laws.get(usize::from(label)).is_none_or(Option::is_none) {
                 limit = limit.min(short_of(time));
             }
         }
+        let (tree, lives, logs) = (&self.world.tree, &self.world.lives, self.log.records());
+        let threads = self.setup.settings.threads;
+        let mut later = Vec::new();
         for _ in 0..TRIALS {
-            slots.retain(|&(time, slot)| {
-                if time >= limit {
-                    self.schedule.schedule_lazy(time, slot);
-                }
-                time < limit
-            });
-            if slots.len() < FEW {
+            later.extend(entries.extract_if(.., |(time, _)| *time >= limit));
+            if entries.len() < FEW {
                 break;
             }
-            let (tree, lives, logs) = (&self.world.tree, &self.world.lives, self.log.records());
             let course = Course { tree, lives, laws: &laws, limit, logs };
-            let mut plan = Planner::new(course).plan(&slots);
-            order::sort(&mut plan.events);
-            let near = order::first_near(&plan.events).map_or(f64::INFINITY, SimTime::to_f64);
-            let excess = plan.events.get(room as usize).map_or(f64::INFINITY, |event| event.at.to_f64());
-            let cut = plan.cut.min(near).min(excess);
+            let slots: Vec<u32> = entries.iter().map(|(_, slot)| *slot).collect();
+            let mut plans = plans(course, &slots, threads);
+            let cut = plans.iter().map(|plan| plan.cut).fold(f64::INFINITY, f64::min);
+            let (lists, logged) = plan::take_events(&mut plans);
+            let events = Sorted::of(lists, threads);
+            let near = events.near.map_or(f64::INFINITY, SimTime::to_f64);
+            let excess = events.nth(room as usize).map_or(f64::INFINITY, |event| event.at.to_f64());
+            let cut = cut.min(near).min(excess);
             if cut == f64::INFINITY {
-                let instants = 1 + plan.events.windows(2).filter(|pair| pair[0].at != pair[1].at).count();
-                return Some((plan, instants as u64));
+                self.schedule.schedule_all_lazy(later);
+                return Some(Planned { plans, events, logged });
             }
             limit = short_of(cut);
-            if plan.events.iter().filter(|event| event.at.to_f64() < limit).count() < FEW {
+            if events.iter().take_while(|event| event.at.to_f64() < limit).count() < FEW {
                 break;
             }
         }
-        for (time, slot) in slots {
-            self.schedule.schedule_lazy(time, slot);
-        }
+        later.append(&mut entries);
+        self.schedule.schedule_all_lazy(later);
         None
     }
 
     /// Makes what is planned so.
-    fn carry_out(&mut self, plan: Plan, instants: u64) {
-        let Some(last) = plan.events.last() else { return };
+    fn carry_out(&mut self, planned: &Planned) {
+        let Planned { plans, events, logged } = planned;
+        let Some(last) = events.last() else { return };
         if self.log.records() {
-            let mut group = self.instant.number;
-            let mut before = None;
-            for happened in &plan.events {
-                group += u64::from(before != Some(happened.at));
-                before = Some(happened.at);
-                let plan::Logged { lineage, kind, rule, clause, residual } =
-                    plan.logged[happened.entry as usize];
-                let time = happened.at.to_f64();
-                let (successor, made, transition) = (None, 1, None);
-                #[rustfmt::skip]
-                self.log.add(Event { time, lineage, kind, rule, clause, successor, made, residual, group, transition });
+            self.log_chains(events, logged);
+        }
+        let mut next = Vec::new();
+        for plan in plans {
+            for runner in plan.runners.iter().filter(|runner| runner.productions > 0) {
+                let plan::Runner { slot, kind, birth, family, label, productions, values, .. } = *runner;
+                let arguments = &plan.values[values.0 as usize..values.1 as usize];
+                let last = LastOfChain { kind, arguments, birth, family, label, productions };
+                self.world.tree.replace_chain(slot, &last);
+                next.extend(runner.next.map(|time| (time, slot)));
             }
         }
-        for runner in plan.runners.iter().filter(|runner| runner.productions > 0) {
-            let plan::Runner { slot, kind, birth, family, label, productions, next, values, .. } = *runner;
-            let arguments = &plan.values[values.0 as usize..values.1 as usize];
-            let last = LastOfChain { kind, arguments, birth, family, label, productions };
-            self.world.tree.replace_chain(slot, &last);
-            if let Some(time) = next {
-                self.schedule.schedule_lazy(time, slot);
-            }
-        }
+        self.schedule.schedule_all_lazy(next);
         self.instant.at = last.at;
+        let (productions, instants) = (events.len() as u64, events.instants);
         self.instant.number += instants;
         self.world.structure += instants;
-        self.log.stats.events += plan.events.len() as u64;
-        self.chains.productions += plan.events.len() as u64;
+        self.log.stats.events += productions;
+        self.chains.productions += productions;
         self.schedule.passed += instants;
         self.schedule.last = Some((last.at, true));
         self.goes_on();
+    }
+
+    /// Records what takes place.
+    fn log_chains(&mut self, events: &Sorted, logged: &[Logged]) {
+        let mut group = self.instant.number;
+        let mut before = None;
+        for happened in events.iter() {
+            group += u64::from(before != Some(happened.at));
+            before = Some(happened.at);
+            let Logged { lineage, kind, rule, clause, residual } = logged[happened.entry as usize];
+            let time = happened.at.to_f64();
+            let (successor, made, transition) = (None, 1, None);
+            #[rustfmt::skip]
+            self.log.add(Event { time, lineage, kind, rule, clause, successor, made, residual, group, transition });
+        }
     }
 }

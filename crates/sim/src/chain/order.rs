@@ -3,72 +3,115 @@
 use dlsys_tree::SimTime;
 use std::cmp::Ordering;
 
+use super::threads;
+use crate::schedule::sort_by_time;
+
 /// A production of a chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Happened {
     pub at: SimTime,
     /// Of the module that is replaced.
     pub slot: u32,
-    /// The number of the production in the plan.
+    /// Its number in the plan.
     pub entry: u32,
 }
 
+/// The productions of some chains in the order of the schedule: by instants, then slots.
+#[derive(Debug, Default)]
+pub struct Sorted {
+    /// All of them, in ranges of time that do not meet; none is empty.
+    ranges: Vec<Range>,
+    /// Number of instants.
+    pub instants: u64,
+    /// The first instant that is so near the next one that both count as one, though their computed times differ: what takes place then is
+    /// decided in the general way.
+    pub near: Option<SimTime>,
+}
+
+/// Productions in a range of time.
+#[derive(Debug)]
+struct Range {
+    events: Vec<Happened>,
+    instants: u64,
+    near: Option<SimTime>,
+}
+
+impl Range {
+    fn of(mut events: Vec<Happened>) -> Range {
+        sort(&mut events);
+        let changes = events.windows(2).filter(|pair| pair[0].at != pair[1].at).count() as u64;
+        let near = first_near(&events);
+        Range { instants: changes + u64::from(!events.is_empty()), near, events }
+    }
+}
+
+impl Sorted {
+    /// Sorts productions that are in several lists, on several threads.
+    pub fn of(mut lists: Vec<Vec<Happened>>, threads: usize) -> Sorted {
+        let ranges = match (threads, lists.len()) {
+            (..=1, 1) => lists.drain(..).map(Range::of).collect(),
+            _ => in_ranges(&lists, threads),
+        };
+        let mut sorted = Sorted::default();
+        for range in ranges.into_iter().filter(|range| !range.events.is_empty()) {
+            sorted.instants += range.instants;
+            let ends = sorted.last().zip(range.events.first());
+            let meeting = ends.and_then(|(a, b)| first_near(&[*a, *b]));
+            sorted.near = sorted.near.or(meeting).or(range.near);
+            sorted.ranges.push(range);
+        }
+        sorted
+    }
+
+    pub fn len(&self) -> usize {
+        self.ranges.iter().map(|range| range.events.len()).sum()
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &Happened> {
+        self.ranges.iter().flat_map(|range| &range.events)
+    }
+
+    pub fn nth(&self, mut number: usize) -> Option<&Happened> {
+        for Range { events, .. } in &self.ranges {
+            match events.get(number) {
+                None => number -= events.len(),
+                found => return found,
+            }
+        }
+        None
+    }
+
+    pub fn last(&self) -> Option<&Happened> {
+        self.ranges.last()?.events.last()
+    }
+}
+
+/// The productions in each of as many equal ranges of time as there are threads.
+fn in_ranges(lists: &[Vec<Happened>], threads: usize) -> Vec<Range> {
+    let times = lists.iter().flatten().map(|event| event.at.to_f64());
+    let [first, last] =
+        times.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], t| [low.min(t), high.max(t)]);
+    let scale = threads as f64 / (last - first);
+    let count = if scale > 0.0 && scale.is_finite() { threads.max(1) } else { 1 };
+    let range_of = |event: &Happened| match count {
+        1 => 0,
+        _ => (((event.at.to_f64() - first) * scale) as usize).min(count - 1),
+    };
+    threads::each(threads, count, |number| {
+        Range::of(lists.iter().flatten().filter(|event| range_of(event) == number).copied().collect())
+    })
+}
+
 /// Sorts productions as the schedule does, by instants, then slots.
-pub fn sort(events: &mut Vec<Happened>) {
+fn sort(events: &mut Vec<Happened>) {
     let compare = |a: &Happened, b: &Happened| {
         a.at.partial_cmp(&b.at).unwrap_or(Ordering::Equal).then(a.slot.cmp(&b.slot))
     };
     sort_by_time(events, |event| event.at.to_f64(), compare);
 }
 
-/// Sorts things by their times, and what has one time by a comparison that begins with times. They are about evenly distributed over some
-/// time, so that each is near its place when all are put into as many equal parts of that time.
-pub fn sort_by_time<T: Copy>(
-    all: &mut Vec<T>,
-    time: impl Fn(&T) -> f64,
-    compare: impl Fn(&T, &T) -> Ordering + Copy,
-) {
-    if all.is_sorted_by(|a, b| compare(a, b) != Ordering::Greater) {
-        return;
-    }
-    let first = all.iter().map(&time).fold(f64::INFINITY, f64::min);
-    let last = all.iter().map(&time).fold(f64::NEG_INFINITY, f64::max);
-    let scale = all.len() as f64 / (last - first);
-    if !(scale > 0.0 && scale.is_finite()) {
-        return all.sort_by(compare);
-    }
-    let last_part = all.len() - 1;
-    let part = |one: &T| (((time(one) - first) * scale) as usize).min(last_part);
-    // Where each part begins, then where its next one goes to.
-    let mut places = vec![0u32; all.len() + 1];
-    for one in &*all {
-        places[part(one) + 1] += 1;
-    }
-    for i in 1..places.len() {
-        places[i] += places[i - 1];
-    }
-    let mut sorted = all.clone();
-    for one in &*all {
-        let place = &mut places[part(one)];
-        sorted[*place as usize] = *one;
-        *place += 1;
-    }
-    // A place is now the end of its part.
-    let mut begin = 0;
-    for &end in &places[..places.len() - 1] {
-        let end = end as usize;
-        if end - begin > 1 {
-            // Twins come in the order of their slots: a stable sort finds that.
-            sorted[begin..end].sort_by(compare);
-        }
-        begin = end;
-    }
-    *all = sorted;
-}
-
-/// The first of sorted productions that is so near the next one that both are one instant, though their computed times differ: what takes
-/// place then is decided in the general way.
-pub fn first_near(events: &[Happened]) -> Option<SimTime> {
+/// The first of sorted productions that is so near the next one that both are one instant.
+fn first_near(events: &[Happened]) -> Option<SimTime> {
     let is_near = |pair: &&[Happened]| {
         let [a, b] = [pair[0].at, pair[1].at];
         a != b && b.since(a) <= 4.0 * b.resolution()
@@ -95,8 +138,19 @@ mod tests {
             }
             let mut expected = events.clone();
             expected.sort_by(|a, b| a.at.partial_cmp(&b.at).expect("numbers").then(a.slot.cmp(&b.slot)));
-            sort(&mut events);
-            prop_assert_eq!(events, expected);
+            let changes = expected.windows(2).filter(|pair| pair[0].at != pair[1].at).count();
+            let instants = if expected.is_empty() { 0 } else { 1 + changes as u64 };
+            for threads in [1, 2, 3] {
+                let lists = match threads {
+                    1 => vec![events.clone()],
+                    _ => events.chunks(7).map(<[Happened]>::to_vec).collect(),
+                };
+                let sorted = Sorted::of(lists, threads);
+                prop_assert_eq!(sorted.iter().copied().collect::<Vec<_>>(), &expected[..]);
+                prop_assert_eq!((sorted.instants, sorted.len()), (instants, expected.len()));
+                prop_assert_eq!(sorted.near, first_near(&expected));
+                prop_assert_eq!(sorted.last(), expected.last());
+            }
         }
     }
 

@@ -11,11 +11,14 @@ use dlsys_tree::{Family, Lineage, NO_LABEL, SimTime, Tree};
 use super::lanes::{Block, Fate};
 use super::law::Law;
 use super::order::Happened;
+use super::threads;
 use crate::event::SHORT_LIFE;
 use crate::world::life::Lives;
 
 /// Runners that are followed together.
 const GROUP: usize = 1024;
+/// Parts of the work of a plan for each thread.
+const PARTS: usize = 4;
 
 /// The facts of a plan.
 #[derive(Clone, Copy)]
@@ -32,7 +35,6 @@ pub struct Course<'a, 'm> {
 #[derive(Clone, Debug)]
 pub struct Runner {
     pub slot: u32,
-    pub lineage: Lineage,
     /// Number of productions.
     pub productions: u32,
     /// Of the last production.
@@ -79,6 +81,12 @@ struct Crowd {
 #[derive(Clone, Copy, Debug)]
 struct Walker {
     runner: u32,
+    slot: u32,
+    /// Of the module that lives it.
+    kind: KindId,
+    lineage: Lineage,
+    /// Number of productions before it.
+    productions: u32,
     birth: SimTime,
     /// The event, and the level that a parameter meets then.
     at: SimTime,
@@ -112,8 +120,38 @@ impl Crowd {
     }
 }
 
-/// Makes a plan for some modules, whose slots are given.
-pub struct Planner<'a, 'm> {
+/// Plans for some modules, whose slots are given, made on several threads; each is for modules that follow each other in the list.
+pub fn plans(course: Course, slots: &[u32], threads: usize) -> Vec<Plan> {
+    let size = match threads {
+        ..=1 => slots.len(),
+        // Some threads may be faster than others.
+        _ => slots.len().div_ceil(PARTS * threads).max(LANES),
+    };
+    let chunks: Vec<&[u32]> = slots.chunks(size.max(1)).collect();
+    threads::each(threads, chunks.len(), |number| Planner::new(course).plan(chunks[number]))
+}
+
+/// The productions of some plans, one list for each, and what is logged of all of them, by entry.
+pub fn take_events(plans: &mut [Plan]) -> (Vec<Vec<Happened>>, Vec<Logged>) {
+    let (mut lists, mut logged) = (Vec::with_capacity(plans.len()), Vec::new());
+    let mut first = 0;
+    for plan in plans {
+        let mut events = std::mem::take(&mut plan.events);
+        if first > 0 {
+            events.iter_mut().for_each(|event| event.entry += first);
+        }
+        first += events.len() as u32;
+        lists.push(events);
+        match logged.is_empty() {
+            true => logged = std::mem::take(&mut plan.logged),
+            false => logged.append(&mut plan.logged),
+        }
+    }
+    (lists, logged)
+}
+
+/// Makes a plan for some modules.
+struct Planner<'a, 'm> {
     course: Course<'a, 'm>,
     plan: Plan,
     /// By label: lives whose events come before the limit.
@@ -126,14 +164,14 @@ pub struct Planner<'a, 'm> {
 }
 
 impl<'a, 'm> Planner<'a, 'm> {
-    pub fn new(course: Course<'a, 'm>) -> Planner<'a, 'm> {
+    fn new(course: Course<'a, 'm>) -> Planner<'a, 'm> {
         let crowds = course.laws.iter().map(|_| Crowd::default()).collect();
         let plan = Plan { cut: f64::INFINITY, ..Plan::default() };
         let (spare, block, fates, arguments) = Default::default();
         Planner { course, plan, crowds, spare, block, fates, arguments }
     }
 
-    pub fn plan(mut self, slots: &[(f64, u32)]) -> Plan {
+    fn plan(mut self, slots: &[u32]) -> Plan {
         for group in slots.chunks(GROUP) {
             self.start(group);
             // The largest crowd fills most lanes.
@@ -153,16 +191,15 @@ impl<'a, 'm> Planner<'a, 'm> {
     }
 
     /// Takes up modules of the tree.
-    fn start(&mut self, group: &[(f64, u32)]) {
+    fn start(&mut self, group: &[u32]) {
         let Course { tree, lives, laws, .. } = self.course;
         let mut starting: Vec<Crowd> = laws.iter().map(|_| Crowd::default()).collect();
-        for &(_, slot) in group {
+        for &slot in group {
             let look = tree.look(slot);
             let (birth, runner) = (look.birth, self.plan.runners.len() as u32);
             let lineage = tree.lineage_of(&look);
             self.plan.runners.push(Runner {
                 slot,
-                lineage,
                 productions: 0,
                 family: Family::AXIOM,
                 kind: look.kind,
@@ -171,7 +208,8 @@ impl<'a, 'm> Planner<'a, 'm> {
                 next: None,
                 values: (0, 0),
             });
-            let walker = Walker { runner, birth, at: birth, level: 0.0 };
+            let (kind, productions, level) = (look.kind, 0, 0.0);
+            let walker = Walker { runner, slot, kind, lineage, productions, birth, at: birth, level };
             starting[look.label as usize].add(walker, look.values.iter().copied());
         }
         for (label, crowd) in starting.iter().enumerate() {
@@ -227,47 +265,46 @@ impl<'a, 'm> Planner<'a, 'm> {
         }
         let production = Outcome::production(law.key, 0);
         for (lane, (walker, fate)) in walkers.iter().zip(&*fates).enumerate() {
-            let (at, time) = (walker.at, walker.at.to_f64());
+            let Walker { runner, slot, lineage, at, .. } = *walker;
             let is_short = at.since(walker.birth) <= SHORT_LIFE * at.resolution();
             let is_finite = arguments.iter().all(|lanes| lanes[lane].is_finite());
             let (label, next) = match *fate {
                 Fate::Ends(label, next, level) if is_finite && !is_short => (label, Some((next, level))),
                 Fate::Lasts(label) if is_finite && !is_short => (label, None),
                 _ => {
-                    plan.cut = plan.cut.min(time);
+                    plan.cut = plan.cut.min(at.to_f64());
                     continue;
                 }
             };
-            let runner = &mut plan.runners[walker.runner as usize];
             if logs {
-                let Runner { lineage, kind, .. } = *runner;
-                let residual = residuals[lane];
+                let (kind, residual) = (walker.kind, residuals[lane]);
                 plan.logged.push(Logged { lineage, kind, rule: rule.index, clause: law.produce, residual });
             }
-            let entry = plan.events.len() as u32;
-            plan.events.push(Happened { at, slot: runner.slot, entry });
-            runner.productions += 1;
-            runner.kind = law.successor;
-            let family = runner.lineage.family(production);
-            runner.lineage = family.child(0);
+            plan.events.push(Happened { at, slot, entry: plan.events.len() as u32 });
+            let (kind, productions, family) =
+                (law.successor, walker.productions + 1, lineage.family(production));
             let values = arguments.iter().map(|lanes| lanes[lane]);
             if let Some((next, level)) = next
                 && next.to_f64() < limit
             {
                 match laws[usize::from(label)] {
                     Some(_) => {
-                        let walker = Walker { birth: at, at: next, level, ..*walker };
+                        let lineage = family.child(0);
+                        #[rustfmt::skip]
+                        let walker =
+                            Walker { runner, slot, kind, lineage, productions, birth: at, at: next, level };
                         crowds[usize::from(label)].add(walker, values);
                         continue;
                     }
                     None => plan.cut = plan.cut.min(next.to_f64()),
                 }
             }
-            (runner.birth, runner.label, runner.family) = (at, label, family);
-            runner.next = next.map(|(next, _)| next.to_f64());
             let first = plan.values.len();
             plan.values.extend(values);
-            runner.values = (first as u32, plan.values.len() as u32);
+            let values = (first as u32, plan.values.len() as u32);
+            let next = next.map(|(next, _)| next.to_f64());
+            plan.runners[runner as usize] =
+                Runner { slot, productions, family, kind, birth: at, label, next, values };
         }
         end
     }

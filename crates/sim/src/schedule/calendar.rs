@@ -6,10 +6,14 @@
 
 use std::collections::VecDeque;
 
+use super::sort_by_time;
+
 /// An entry's slot has this bit if it is the number of a run; a tree has no such slots.
 const RUN: u32 = 1 << 31;
 /// Children of an entry in the heap: four lie in one line of the cache.
 const ARITY: usize = 4;
+/// A part of the heap of this size or less is taken out, or put in, entry by entry.
+const FEW: usize = 32;
 /// A heap that can hold no more than this keeps its memory.
 const LARGE: usize = 1 << 16;
 /// Lines beside the heap.
@@ -53,6 +57,8 @@ pub struct CalendarQueue {
     heap: Vec<CalendarEntry>,
     /// The first place of the heap is empty: most events are followed by a later one, which is put there.
     hole: bool,
+    /// The entries of the heap are in no order: a good part of them was taken out or put in at once.
+    loose: bool,
     runs: Vec<Vec<u32>>,
     free_runs: Vec<u32>,
     /// Times lately put in, by a hash, with their runs.
@@ -68,6 +74,7 @@ impl Default for CalendarQueue {
             ends: [f64::NEG_INFINITY; LINES],
             heap: Vec::new(),
             hole: false,
+            loose: false,
             runs: Vec::new(),
             free_runs: Vec::new(),
             recent: [(u64::MAX, NOWHERE); RECENT],
@@ -114,6 +121,7 @@ impl CalendarQueue {
     #[inline]
     fn first(&mut self) -> Option<(CalendarEntry, Option<usize>)> {
         if self.first.is_none() {
+            self.settle();
             self.first = self.find_first();
         }
         self.first
@@ -180,7 +188,7 @@ impl CalendarQueue {
 
     /// Number of events before a time, counted up to a number at least.
     pub fn count_before(&mut self, time: f64, enough: usize) -> usize {
-        self.fill_hole();
+        self.settle();
         let events = |entry: &CalendarEntry| match entry.slot & RUN {
             0 => 1,
             _ => self.runs[(entry.slot & !RUN) as usize].len(),
@@ -203,7 +211,7 @@ impl CalendarQueue {
 
     /// Takes out all events before a time, in any order.
     pub fn take_before(&mut self, time: f64, out: &mut Vec<(f64, u32)>) {
-        self.fill_hole();
+        self.settle();
         self.first = None;
         let mut taken = Vec::new();
         for (line, end) in self.lines.iter_mut().zip(&mut self.ends) {
@@ -218,7 +226,7 @@ impl CalendarQueue {
             }
         }
         // One by one, as long as these are few of all.
-        let few = self.heap.len() / 32;
+        let few = self.heap.len() / FEW;
         for _ in 0..few {
             match self.heap.first() {
                 Some(&first) if first.time() < time => taken.push(first),
@@ -230,7 +238,7 @@ impl CalendarQueue {
         if self.heap.first().is_some_and(|first| first.time() < time) {
             let is_taken = |entry: &mut CalendarEntry| entry.time() < time;
             taken.extend(self.heap.extract_if(.., is_taken));
-            self.put_in_order();
+            self.loose = true;
         }
         for entry in taken {
             let time = entry.time();
@@ -241,8 +249,26 @@ impl CalendarQueue {
         }
     }
 
-    /// Makes a heap of the entries in it (Floyd 1964).
-    fn put_in_order(&mut self) {
+    /// Puts in many events.
+    pub fn push_all(&mut self, mut entries: Vec<(f64, u32)>) {
+        // Where newborns are alike, their events come in this order, and wait in lines.
+        sort_by_time(&mut entries, |(time, _)| *time, |a, b| a.0.total_cmp(&b.0));
+        self.loose |= entries.len() > self.heap.len() / FEW;
+        if self.loose {
+            self.fill_hole();
+            self.first = None;
+        }
+        for (time, slot) in entries {
+            self.push(time, slot);
+        }
+    }
+
+    /// Makes a heap of the entries in it (Floyd 1964), if they are not one.
+    fn settle(&mut self) {
+        self.fill_hole();
+        if !std::mem::take(&mut self.loose) {
+            return;
+        }
         for at in (0..self.heap.len().div_ceil(ARITY)).rev() {
             let entry = self.heap[at];
             self.sift_down_from(at, entry);
@@ -264,6 +290,9 @@ impl CalendarQueue {
         if let Some(line) = line {
             self.ends[line] = time;
             return self.lines[line].push_back(entry);
+        }
+        if self.loose {
+            return self.heap.push(entry);
         }
         if self.hole {
             self.hole = false;
@@ -348,7 +377,7 @@ mod tests {
     proptest! {
         /// Against a sorted list; few different times, so that many meet.
         #[test]
-        fn bundles_come_in_order(steps in proptest::collection::vec((0..6u8, 0..40u32), 0..300)) {
+        fn bundles_come_in_order(steps in proptest::collection::vec((0..7u8, 0..40u32), 0..300)) {
             let mut queue = CalendarQueue::default();
             let mut list: Vec<(u32, u32)> = Vec::new();
             for (slot, (what, time)) in (0..).zip(steps) {
@@ -371,12 +400,22 @@ mod tests {
                     let mut found = out;
                     found.sort_unstable();
                     let first = list.iter().map(|e| e.0).min();
-                    let wanted: Vec<u32> = list.iter().filter(|e| Some(e.0) == first).map(|e| e.1).collect();
+                    let mut wanted: Vec<u32> = list.iter().filter(|e| Some(e.0) == first).map(|e| e.1).collect();
+                    wanted.sort_unstable();
                     prop_assert_eq!(found, wanted);
                     list.retain(|e| Some(e.0) != first);
+                } else if what == 6 {
+                    // In no order, and some at one time.
+                    let new: Vec<(u32, u32)> = (0..time).map(|k| ((7 * k + time) % 23 + k % 2, slot + 1000 * k)).collect();
+                    queue.push_all(new.iter().map(|(time, slot)| (f64::from(*time), *slot)).collect());
+                    list.extend(new);
                 } else {
                     queue.push(f64::from(time), slot);
                     list.push((time, slot));
+                }
+                // Not always: looking for the first puts the heap in order.
+                if slot.is_multiple_of(3) {
+                    continue;
                 }
                 prop_assert_eq!(queue.earliest(), list.iter().map(|e| f64::from(e.0)).reduce(f64::min));
             }

@@ -7,6 +7,7 @@
 
 mod calendar;
 mod indexed;
+mod sorting;
 
 use std::cmp::Ordering;
 use std::collections::HashSet;
@@ -17,6 +18,7 @@ use dlsys_tree::{ModuleId, SimTime};
 use indexed::IndexedQueue;
 
 pub use indexed::{Entry, Owner};
+pub use sorting::sort_by_time;
 
 /// The lazy events of one float.
 #[derive(Clone, Debug, Default)]
@@ -132,6 +134,11 @@ impl Schedule {
     #[inline]
     pub fn schedule_lazy(&mut self, time: f64, slot: u32) {
         self.calendar.push(time, slot);
+    }
+
+    /// Puts in the events of many lazy modules: the time of each, and its slot.
+    pub fn schedule_all_lazy(&mut self, entries: Vec<(f64, u32)>) {
+        self.calendar.push_all(entries);
     }
 
     /// Puts an entry back that was taken.

@@ -178,7 +178,7 @@ impl Scanner<'_> {
     }
 }
 
-/// Space between the words of a line, as in the grammar: `WHITESPACE` in `grammars/dlsys.pest`.
-fn is_space(c: char) -> bool {
+/// Space between the words of a line; other white space is an error.
+pub(super) fn is_space(c: char) -> bool {
     matches!(c, ' ' | '\t' | '\r' | '\u{A0}')
 }

@@ -20,7 +20,7 @@ use crate::Errors;
 use crate::ast::{Document, Expression, HeadModule, Item, Part, modules_of};
 use crate::declarations::{Body, Named};
 use crate::grammar::{Grammar, Pair, Rule};
-use crate::layout::{ItemKind, RawItem, layout};
+use crate::layout::{ItemKind, RawItem, layout, with_spaces};
 use crate::lexeme::in_name;
 use crate::{foreign_lines, foreign_syntax};
 use dlsys_diagnostic::{Diagnostic, Source, Span};
@@ -171,7 +171,8 @@ fn read_alone<T>(
         offset: 0,
         defined: None,
     };
-    let pair = pest_parse(rule, &source.text, 0).map_err(|error| match rule {
+    let text = with_spaces(&source.text);
+    let pair = pest_parse(rule, &text, 0).map_err(|error| match rule {
         Rule::measure => Errors::from((*error).help(MEASURE)),
         _ => Errors::from(*error),
     })?;
