@@ -27,7 +27,7 @@ impl Exporter for Svg {
         let (fit, page) = writer.fit.for_frame(scene, &writer.page);
         let sky = Sky::of(scene, &fit, &page);
         let (scene, floor) = floor::added(scene, &fit, Some(&page));
-        let style = Style { floor, ..style(&fit, &page) };
+        let style = Style { floor, memory: Some(&writer.memory), ..style(&fit, &page) };
         out.write_all(
             around(&page, title, sky.as_ref(), painter::elements(&scene, style, true, "")).as_bytes(),
         )
@@ -37,7 +37,7 @@ impl Exporter for Svg {
 /// How frames are painted on a page.
 pub(crate) fn style<'a>(fit: &'a Fit, page: &Page) -> Style<'a> {
     let [pixels, ..] = page.placement();
-    Style { fit, scale: page.picture.scale, pixels, background: page.background, floor: None }
+    Style { fit, scale: page.picture.scale, pixels, background: page.background, floor: None, memory: None }
 }
 
 /// The document of a page with these elements, each with its line's end. A sky stands in place of the background.
