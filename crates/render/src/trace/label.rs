@@ -115,7 +115,7 @@ pub fn label(
     let mut labels = filled(&mut rasters.labels, numbers.len(), NOTHING);
     let mut item_of: Vec<Option<Item>> = (0..mesh.faces.len()).map(|n| stems.item(mesh, n)).collect();
     let large = if is_fine { (CELLS_PER_PIXEL * CELLS_PER_PIXEL) as usize * LARGE } else { LARGE };
-    shade_finely(&mut item_of, numbers, width, large);
+    shade_finely(mesh, &mut item_of, numbers, width, large);
     let has_shades = |n: usize| item_of[n].is_some_and(|item| item.stem.is_none());
     let strengths = filled(&mut rasters.strengths, numbers.len(), 0.0);
     let strengths = lit_cells(lit, numbers, width, has_shades, strengths);
@@ -183,17 +183,29 @@ pub fn label(
     (Regions { width, labels, places, samples, per_cell, items, steps, strengths, least }, shades)
 }
 
-/// Gives more shades to the looks that cover more than so many cells. Triangles of one look follow one another.
-fn shade_finely(items: &mut [Option<Item>], numbers: &[[u32; 1]], width: usize, large: usize) {
+/// Gives more shades to the looks of surfaces that cover more than so many cells each. Triangles of one look follow one another, and so do
+/// those of one surface.
+fn shade_finely(
+    mesh: &Triangles,
+    items: &mut [Option<Item>],
+    numbers: &[[u32; 1]],
+    width: usize,
+    large: usize,
+) {
     let mut covered = vec![0; items.len() + 1];
     for row in numbers.chunks(width).step_by(APART) {
         row.iter().step_by(APART).for_each(|[number]| covered[*number as usize] += APART * APART);
     }
     let mut first = 0;
     for run in items.chunk_by_mut(|a, b| a.map(|item| item.look) == b.map(|item| item.look)) {
-        let cells: usize = covered[first + 1..].iter().take(run.len()).sum();
-        first += run.len();
-        if cells > large {
+        let mut largest = 0;
+        for surface in mesh.faces[first..first + run.len()].chunk_by(|a, b| a.surface == b.surface) {
+            // Those of no triangle come before all others.
+            let cells: usize = covered[first + 1..].iter().take(surface.len()).sum();
+            first += surface.len();
+            largest = cells.max(largest);
+        }
+        if largest > large {
             run.iter_mut().flatten().for_each(|item| item.shades = FINE_SHADES);
         }
     }
