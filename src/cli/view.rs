@@ -6,7 +6,7 @@ use std::path::Path;
 use super::album::Keeping;
 use super::args::ViewArgs;
 use super::common::{Failure, ModelRun, cores, count_of, out_error};
-use super::frame_source::{Frame, Pass, play};
+use super::frame_source::{Frame, Pass, play, play_at};
 use super::progress::Progress;
 use crate::diagnostic::Diagnostic;
 use crate::player::{Clouds, Recorder, Recording, Stage, page};
@@ -16,6 +16,11 @@ use crate::sim::Settings;
 
 /// Largest number of frames of a recording, about five minutes at 60 frames per second.
 const MOST_FRAMES: usize = 20_000;
+
+/// Frames that are looked at before a scene of plants is recorded, and how many times what a page holds is certainly too much: what
+/// moves straight takes fewer numbers.
+const LOOKS: usize = 8;
+const CERTAIN: usize = 4;
 
 /// Opens the window, or writes a page.
 pub fn view(args: &ViewArgs) -> Result<(), Failure> {
@@ -81,6 +86,7 @@ fn write(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
             "error: {count} frames are too many for a page, which takes {MOST_FRAMES}: choose fewer with `--from A --to B --step S`\n"
         )));
     }
+    look_ahead(&run)?;
     let recording = record(&run, args.accuracy)?;
     let document = page::document(&recording);
     let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -109,6 +115,36 @@ fn spare(args: &ViewArgs, out: &Path) -> Result<(), Failure> {
         "{} is there and is not a page of `dlsys view`: choose another name, or add --force",
         out.display()
     ))
+}
+
+/// Refuses at once what is certainly too much to record: a scene of plants whose frames, by a look at a few of them, have many times the
+/// numbers that a page holds.
+fn look_ahead(run: &ModelRun) -> Result<(), Failure> {
+    let count = run.times.len();
+    if run.session.model.scenery.plants.is_empty() || count <= 2 * LOOKS {
+        return Ok(());
+    }
+    let times = (0..LOOKS).map(|i| run.times[i * (count - 1) / (LOOKS - 1)]).collect();
+    let pass =
+        Pass { settings: Settings { log: false, ..run.settings }, keeping: Keeping::Nothing, accuracy: 0.0 };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut numbers = 0;
+    let weight = |_: &Frame, scene: &Scene| Stage::weight(scene);
+    play_at(run, times, pass, threads, (&mut { run.clock }, None), weight, |weight| {
+        numbers += weight;
+        Ok(())
+    })?;
+    let all = numbers / LOOKS * count;
+    if all <= CERTAIN * Recorder::MOST_NUMBERS {
+        return Ok(());
+    }
+    let millions = |numbers: usize| (numbers as f64 / 1e6).round();
+    Err(Failure::Model(format!(
+        "error: there is too much to record: the plants of {count} frames are placed by about {} million numbers, and a page holds {} million\n  \
+         help: take fewer plants, or fewer frames with `--from A --to B --step S`; a film holds any number: `dlsys render MODEL --format webp`\n",
+        millions(all),
+        millions(Recorder::MOST_NUMBERS),
+    )))
 }
 
 /// Runs the model twice, because recorded coordinates are relative to the extent of the animation. Frames are drawn on all

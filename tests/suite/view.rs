@@ -392,6 +392,25 @@ fn files_of_others_are_not_written_over() {
 }
 
 #[test]
+fn plants_that_are_too_much_for_a_page_are_refused_before_they_are_recorded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let tuft = "initial string: for i in 1 .. 40: ( [ /(9*i) &(40) A(0) ] )\nA(x): solve dx/dt = 1\ninterpret A(x): F(1 + x)";
+    fs::write(file("tuft.dls"), tuft).expect("written");
+    let field = "plant @Tuft from \"tuft.dls\"\ninitial string: for i in 1 .. 2500: ( @Tuft(0) f(1) )";
+    fs::write(file("field.dls"), field).expect("written");
+    let line = |step: &str| {
+        let (model, page) = (file("field.dls"), file("field.html"));
+        bad(&["view", &model, "-o", &page, "--from", "0", "--to", "1", "--step", step])
+    };
+    // 2500 tufts of 40 stems with 18 numbers each.
+    let (status, message) = line("0.005");
+    assert!(status == 1 && message.contains("201 frames are placed by about 362 million"), "{message}");
+    assert!(message.contains("holds 75 million") && message.contains("--step"), "{message}");
+    assert!(!folder.path().join("field.html").exists());
+}
+
+#[test]
 fn without_the_window_one_is_told_how_to_get_it() {
     if cfg!(feature = "viewer") {
         return;

@@ -133,6 +133,20 @@ impl Stage {
         self.puffs = puffs(scene, fit, 1);
     }
 
+    /// About how many numbers the things of a scene take, those of plants of other models included: joints and bends of stems take more.
+    pub fn weight(scene: &Scene) -> usize {
+        let surfaces = scene.surfaces.iter().map(|surface| match surface.rest {
+            Some(_) => 3 * surface.mesh.vertices.len(),
+            None => Form::Mesh(0).numbers(),
+        });
+        let polygons = scene.polygons.iter().map(|polygon| 3 * polygon.vertices.len());
+        // Bounded by the depth of plants in plants.
+        let plants = scene.plants.iter().map(|plant| Stage::weight(&plant.scene));
+        let own =
+            scene.segments.len() * Form::Stem(None).numbers() + scene.patches.len() * Form::Patch.numbers();
+        own + surfaces.chain(polygons).chain(plants).sum::<usize>()
+    }
+
     /// Adds ground to what is there: a scene of surfaces.
     pub fn add_ground(&mut self, ground: &Scene) {
         self.set_surfaces(ground, 1);

@@ -114,6 +114,7 @@ pub use view::View;
 
 use std::borrow::Cow;
 use std::io::{self, Write};
+use std::sync::Arc;
 
 use dlsys_geometry::scene::Scene;
 
@@ -136,6 +137,8 @@ pub struct FrameWriter {
     pub sides: usize,
     /// Threads that make the file of one frame (OBJ and PNG), at least 1. The bytes do not depend on it.
     pub threads: usize,
+    /// For the rasters of one frame after another.
+    memory: Arc<trace::Memory>,
 }
 
 impl FrameWriter {
@@ -144,7 +147,7 @@ impl FrameWriter {
     pub fn new(format: Format, fit: Fit) -> FrameWriter {
         let page = Page::usual(fit.picture);
         let fit = if format.content() == Content::Mesh { fit.of_meshes() } else { fit };
-        FrameWriter { format, fit, page, sides: 0, threads: 1 }
+        FrameWriter { format, fit, page, sides: 0, threads: 1, memory: Arc::default() }
     }
 
     /// The bytes of the file of a frame. `title` is its title for readers: the model and the time.

@@ -38,6 +38,8 @@ pub(super) struct Style<'a> {
     pub(super) background: Option<Color>,
     /// The material of the floor.
     pub(super) floor: Option<MaterialId>,
+    /// Memory that is kept from frame to frame.
+    pub(super) memory: Option<&'a trace::Memory>,
 }
 
 /// The elements of a scene, one a line. Names are those of modules; without them the elements have none, and `prefix`

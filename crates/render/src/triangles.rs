@@ -399,13 +399,3 @@ impl Triangles {
         mesh
     }
 }
-
-/// Everything in a scene as triangles, in string order; stems as tubes with so many sides, if they are to be `kept`.
-pub(super) fn triangles(
-    scene: &Scene,
-    fit: &Fit,
-    sides: usize,
-    kept: impl Fn(&Segment) -> bool,
-) -> Triangles {
-    Triangles::of(&Solid::new(scene, fit, sides), kept)
-}

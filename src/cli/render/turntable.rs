@@ -71,7 +71,9 @@ pub fn turned(writer: &FrameWriter, angle: Option<f64>) -> Cow<'_, FrameWriter> 
     match angle {
         None => Cow::Borrowed(writer),
         Some(degrees) => {
-            Cow::Owned(FrameWriter { fit: writer.fit.clone().turned(degrees), ..writer.clone() })
+            let mut turned = writer.clone();
+            turned.fit = writer.fit.clone().turned(degrees);
+            Cow::Owned(turned)
         }
     }
 }

@@ -7,19 +7,15 @@ use crate::lens::Lens;
 use crate::light::Spot;
 use crate::lighting::Lighting;
 use crate::mapping::{Cut, Mapping, Pinned};
-use crate::raster::{self, Corner, Image};
+use crate::raster::{self, Corner, Image, Place};
 use crate::sky::Sky;
 use crate::stage::Stage;
 use crate::triangles::Triangles;
 use crate::{Fit, Page, Smoothness, shot};
 use dlsys_geometry::scene::{Color, MaterialId, Palette, Point, Scene, Texture, Vector};
 
-/// How far a tube's outline may be from a circle, in pixels.
-const ROUNDNESS: f64 = 0.1;
 /// All of a channel, on a page.
 const FULL: u32 = 65535;
-/// Most triangles that tubes are given sides for; a picture with more has thin ones.
-const MOST_TRIANGLES: usize = 4_000_000;
 
 /// Portable Network Graphics.
 pub(crate) struct Png;
@@ -77,6 +73,8 @@ pub(crate) struct Lit<'m> {
     floor: Option<MaterialId>,
     /// By vertex: pixels to the right and down, and depth in scene units.
     places: Vec<[f64; 3]>,
+    /// The same on the grid of the rasteriser.
+    snapped: Vec<Place>,
     /// By vertex: as the camera projects it.
     seen: Vec<Point>,
     normals: Vec<Vector>,
@@ -103,6 +101,7 @@ impl<'m> Lit<'m> {
             lighting: Lighting::new(scene, fit, a, 1, floor, None),
             floor,
             places,
+            snapped: Vec::new(),
             seen,
             normals,
             scale,
@@ -137,11 +136,18 @@ impl<'m> Lit<'m> {
         Some(texture.color(&Mapping::new(pinned)?.print_between(pinned, weights())))
     }
 
-    /// Moves the origin of pixels to another one.
+    /// Moves the origin of pixels to where it stays.
     pub(crate) fn shift(&mut self, [right, down]: [f64; 2]) {
         for [x, y, _] in &mut self.places {
             (*x, *y) = (*x - right, *y - down);
         }
+        let snapped = self.places.iter().map(|&[x, y, z]| Corner { x, y, depth: z * self.scale }.place());
+        self.snapped = snapped.collect();
+    }
+
+    /// The corners of a triangle on the grid of the rasteriser, once the origin stays.
+    pub(crate) fn snapped(&self, n: usize) -> [Place; 3] {
+        self.mesh.faces[n].corners.map(|(vertex, _)| self.snapped[vertex as usize])
     }
 
     /// The corners of a triangle.
@@ -190,17 +196,6 @@ impl<'m> Lit<'m> {
         }
         self.lighting.color(tone.unwrap_or(self.palette.get(material).color), strength)
     }
-}
-
-/// Sides of tubes that look round at so many pixels for a scene unit.
-pub(crate) fn sides(scene: &Scene, fit: &Fit, scale: f64) -> usize {
-    let widths = scene.segments.iter().flat_map(|s| s.widths).map(|w| w.resolve(fit.default_width));
-    let radius = widths.fold(0.0, f64::max) * scale / 2.0;
-    // The side of a polygon is r (1 - cos(π/n)) from its circle.
-    let wanted = std::f64::consts::PI / (1.0 - (ROUNDNESS / radius.max(ROUNDNESS)).min(1.0)).acos();
-    let affordable = MOST_TRIANGLES / (2 * scene.segments.len().max(1));
-    // A multiple of four, so that in a flat drawing both edges have the width that was asked for.
-    (wanted.ceil() as usize).next_multiple_of(4).clamp(8, 64).min((affordable / 4 * 4).max(4))
 }
 
 /// A page for several images, with 16 bits a channel, so that many faint ones add up.

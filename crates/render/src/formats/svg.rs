@@ -27,7 +27,7 @@ impl Exporter for Svg {
         let (fit, page) = writer.fit.for_frame(scene, &writer.page);
         let sky = Sky::of(scene, &fit, &page);
         let (scene, floor) = floor::added(scene, &fit, Some(&page));
-        let style = Style { floor, ..style(&fit, &page) };
+        let style = Style { floor, memory: Some(&writer.memory), ..style(&fit, &page) };
         let elements = painter::elements(&scene, style, true, "");
         let parts = around(&page, title, sky.as_ref(), elements);
         parts.iter().try_for_each(|part| out.write_all(part.as_bytes()))
@@ -37,7 +37,7 @@ impl Exporter for Svg {
 /// How frames are painted on a page.
 pub(crate) fn style<'a>(fit: &'a Fit, page: &Page) -> Style<'a> {
     let [pixels, ..] = page.placement();
-    Style { fit, scale: page.picture.scale, pixels, background: page.background, floor: None }
+    Style { fit, scale: page.picture.scale, pixels, background: page.background, floor: None, memory: None }
 }
 
 /// The document of a page with these elements, each with its line's end, in parts: elements are most of it, and are not copied. A sky stands in

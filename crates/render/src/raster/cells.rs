@@ -1,13 +1,18 @@
 //! Which triangle is the nearest in pixels, at one sample or at several: for the outlines of visible regions.
 
-use super::{Corner, EQUAL, Pattern, STEPS, Triangle};
-use crate::mapping::Cut;
+use std::ops::Range;
 
-/// The pattern of one sample, in the middle of a pixel.
-pub(crate) const MIDDLE: Pattern<1> = [(0, 0)];
+use super::fragments::{Cover, places};
+use super::plane::Ready;
+use super::{Corner, EQUAL, Pattern, Place, STEPS};
+use crate::mapping::Cut;
 
 /// Eight samples, no two in a row or column.
 pub(crate) const EIGHT: Pattern<8> = [(1, -3), (-1, 3), (5, 1), (-3, -5), (-5, 5), (-7, -1), (3, 7), (7, -7)];
+/// In a rectangle of more pixels than this it is not worth the search whether any is to be drawn.
+const FEW: usize = 256;
+/// Half a pixel.
+const HALF: i64 = STEPS / 2;
 
 /// The nearest triangles at the samples of some pixels, one after another: the number of each plus 1, or 0, and its depth.
 pub(crate) struct Nearest<const N: usize> {
@@ -15,90 +20,171 @@ pub(crate) struct Nearest<const N: usize> {
     pub(crate) depths: Vec<[f32; N]>,
 }
 
-/// Finds the nearest of `count` triangles, given their corners and what is cut out of them, at each sample of the pixels that have a `place` below `places`. Of two at the same
-/// depth it is the later. Triangles that are known to be `seen` come first, so that most others are hidden by then.
-pub(crate) fn nearest<'c, const N: usize>(
+/// A number of triangles, the corners of each, and what is cut out of it.
+pub(crate) struct Given<C, D> {
+    pub(crate) count: usize,
+    pub(crate) corners: C,
+    pub(crate) cut: D,
+}
+
+/// Finds the nearest triangle in the middle of each pixel, in rasters that are empty before. Of two at the same depth it is the later.
+pub(crate) fn in_middles<'c>(
+    [width, height]: [usize; 2],
+    triangles: &Given<impl Fn(usize) -> [Place; 3], impl Fn(usize) -> Option<Cut<'c>>>,
+    mut nearest: Nearest<1>,
+) -> Nearest<1> {
+    for number in 0..triangles.count {
+        let corners = (triangles.corners)(number);
+        // Most are so small that they lie between the middles.
+        let columns = middles(corners.map(|p| p.x), width);
+        let rows = middles(corners.map(|p| p.y), height);
+        if columns.is_empty() || rows.is_empty() {
+            continue;
+        }
+        let Some(ready) = Ready::new(corners, width, &(0..height)) else { continue };
+        let cut = (triangles.cut)(number);
+        nearest.add_middles(number as u32 + 1, &ready, [columns, rows], width, cut.as_ref());
+    }
+    nearest
+}
+
+/// The pixels whose middles lie between the coordinates of corners, of so many.
+fn middles(at: [i32; 3], count: usize) -> Range<usize> {
+    let low = (i64::from(at[0].min(at[1]).min(at[2])) + HALF - 1).div_euclid(STEPS);
+    let high = (i64::from(at[0].max(at[1]).max(at[2])) + HALF).div_euclid(STEPS);
+    low.max(0) as usize..high.clamp(0, count as i64) as usize
+}
+
+impl Nearest<1> {
+    fn add_middles(
+        &mut self,
+        number: u32,
+        ready: &Ready,
+        [columns, rows]: [Range<usize>; 2],
+        width: usize,
+        cut: Option<&Cut<'_>>,
+    ) {
+        let plane = ready.plane;
+        let ahead = [(columns.start, ready.columns[0]), (rows.start, ready.rows[0])]
+            .map(|(to, from)| STEPS * (to as i64 - from as i64) + HALF);
+        let mut start = ready.sides.map(|[value, a, b]| value + a * ahead[0] + b * ahead[1]);
+        for row in rows {
+            let mut here = start;
+            (0..3).for_each(|k| start[k] += ready.sides[k][2] * STEPS);
+            let mut entered = false;
+            for column in columns.clone() {
+                let is_outside = here[0] | here[1] | here[2] < 0;
+                (0..3).for_each(|k| here[k] += ready.sides[k][1] * STEPS);
+                if is_outside {
+                    if entered {
+                        break;
+                    }
+                    continue;
+                }
+                entered = true;
+                if cut.is_some_and(|cut| !cut.is_drawn([column as f64 + 0.5, row as f64 + 0.5])) {
+                    continue;
+                }
+                let depth = plane.sample(plane.at([column, row]), [HALF as f32; 2]);
+                let cell = row * width + column;
+                let ([held], [behind]) = (&mut self.numbers[cell], &mut self.depths[cell]);
+                // Later ones have greater numbers.
+                if depth + EQUAL >= *behind {
+                    *behind = if depth > *behind { depth } else { *behind };
+                    *held = number;
+                }
+            }
+        }
+    }
+}
+
+/// Finds the nearest triangle at each sample of the pixels that have a `place` below `count`. Of two at the same depth it is the later.
+/// Triangles that are known to be `seen` come first, so that most others are hidden by then.
+pub(crate) fn at_samples<'c, const N: usize>(
     pattern: &Pattern<N>,
     size: [usize; 2],
-    (count, corners, cut): (usize, impl Fn(usize) -> [Corner; 3], impl Fn(usize) -> Option<Cut<'c>>),
-    (places, place): (usize, impl Fn(usize) -> usize),
+    triangles: &Given<impl Fn(usize) -> [Place; 3], impl Fn(usize) -> Option<Cut<'c>>>,
+    (count, place): (usize, impl Fn(usize) -> usize),
     seen: impl Fn(usize) -> bool,
 ) -> Nearest<N> {
-    let mut nearest = Nearest { numbers: vec![[0; N]; places], depths: vec![[f32::NEG_INFINITY; N]; places] };
-    for number in (0..count).filter(|number| seen(*number)) {
-        nearest.add(pattern, size, (number, corners(number), cut(number)), &place, |_, _| true);
-    }
-    if (0..count).all(&seen) {
-        return nearest;
+    let mut nearest = Nearest { numbers: vec![[0; N]; count], depths: vec![[f32::NEG_INFINITY; N]; count] };
+    let Given { corners, cut, .. } = triangles;
+    for number in (0..triangles.count).filter(|number| seen(*number)) {
+        nearest.add(pattern, size, (number, corners(number), || cut(number)), &place, |_, _| true);
     }
     let farthest = |depths: &[f32; N]| depths.iter().copied().fold(f32::INFINITY, f32::min);
     let far: Vec<f32> = nearest.depths.iter().map(farthest).collect();
-    let is_open = |place: usize, depth: f64| far.get(place).is_some_and(|far| depth as f32 + EQUAL >= *far);
-    for number in (0..count).filter(|number| !seen(*number)) {
-        nearest.add(pattern, size, (number, corners(number), cut(number)), &place, is_open);
+    let is_open = |place: usize, depth: f32| far.get(place).is_some_and(|far| depth + EQUAL >= *far);
+    for number in (0..triangles.count).filter(|number| !seen(*number)) {
+        nearest.add(pattern, size, (number, corners(number), || cut(number)), &place, is_open);
     }
     nearest
 }
 
 impl<const N: usize> Nearest<N> {
     /// Adds a triangle where it is in front. `is_open` tells whether something at this depth may be seen at a place.
-    fn add(
+    fn add<'c>(
         &mut self,
         pattern: &Pattern<N>,
         [width, height]: [usize; 2],
-        (number, corners, cut): (usize, [Corner; 3], Option<Cut<'_>>),
+        (number, corners, cut): (usize, [Place; 3], impl FnOnce() -> Option<Cut<'c>>),
         place: impl Fn(usize) -> usize,
-        is_open: impl Fn(usize, f64) -> bool,
+        is_open: impl Fn(usize, f32) -> bool,
     ) {
-        let offset = |k: i64| (k as f64 + 8.5) / 16.0;
         let front = corners[0].depth.max(corners[1].depth).max(corners[2].depth);
-        let places = self.numbers.len();
+        let count = self.numbers.len();
         let is_drawn = |cell: usize| {
             let at = place(cell);
-            at < places && is_open(at, front)
+            at < count && is_open(at, front)
         };
-        if !touches(pattern, &corners, [width, height], is_drawn) {
+        if !touches(&corners, [width, height], is_drawn) {
             return;
         }
-        let Some(triangle) = Triangle::new(pattern, corners, width, height) else { return };
+        let Some(Ready { columns, rows, sides, plane }) = Ready::new(corners, width, &(0..height)) else {
+            return;
+        };
+        let cut = cut();
+        let samples = places(pattern);
+        let mut cover: Option<Cover<N>> = None;
+        // What the samples of a pixel add to a side's function at most.
+        let most = sides.map(|[_, a, b]| (a.max(0) + b.max(0)) * STEPS);
         let number = number as u32 + 1;
-        let [least, greatest] = triangle.depths;
-        let [origin, right, down] = triangle.depth;
-        let at = &triangle.at_samples;
-        let largest = at.map(|at| at.iter().copied().max().unwrap_or(0));
-        let right_by = triangle.sides.map(|[a, ..]| a * STEPS);
-        for row in triangle.rows[0]..=triangle.rows[1] {
-            let first = triangle.columns[0];
-            let mut corner = [0, 1, 2].map(|k| {
-                let [a, b, c] = triangle.sides[k];
-                a * (first as i64 * STEPS) + b * (row as i64 * STEPS) + c + triangle.bias[k] - right_by[k]
-            });
-            for column in first..=triangle.columns[1] {
-                corner = [0, 1, 2].map(|k| corner[k] + right_by[k]);
-                if (0..3).any(|k| corner[k] + largest[k] < 0) {
+        let mut start = sides.map(|side| side[0]);
+        for row in rows[0]..=rows[1] {
+            let mut corner = start;
+            (0..3).for_each(|k| start[k] += sides[k][2] * STEPS);
+            let mut entered = false;
+            for column in columns[0]..=columns[1] {
+                let here = corner;
+                (0..3).for_each(|k| corner[k] += sides[k][1] * STEPS);
+                if (here[0] + most[0]) | (here[1] + most[1]) | (here[2] + most[2]) < 0 {
+                    if entered {
+                        break;
+                    }
                     continue;
                 }
+                entered = true;
                 let place = place(row * width + column);
-                if !is_open(place, front) {
+                if place >= count || !is_open(place, front) {
                     continue;
                 }
-                let (Some(numbers), Some(depths)) = (self.numbers.get_mut(place), self.depths.get_mut(place))
-                else {
-                    continue;
-                };
-                for (s, &(x, y)) in pattern.iter().enumerate() {
-                    if (corner[0] + at[0][s]) | (corner[1] + at[1][s]) | (corner[2] + at[2][s]) < 0 {
+                let mut left = cover.get_or_insert_with(|| Cover::new(&sides, &samples)).mask(here);
+                let (numbers, depths) = (&mut self.numbers[place], &mut self.depths[place]);
+                let base = plane.at([column, row]);
+                while left != 0 {
+                    let s = left.trailing_zeros() as usize;
+                    left &= left - 1;
+                    let at = [samples[0][s], samples[1][s]];
+                    let step = 1.0 / STEPS as f64;
+                    let whole =
+                        || [column as f64 + f64::from(at[0]) * step, row as f64 + f64::from(at[1]) * step];
+                    if cut.as_ref().is_some_and(|cut| !cut.is_drawn(whole())) {
                         continue;
                     }
-                    let (x, y) = (column as f64 + offset(x), row as f64 + offset(y));
-                    if cut.as_ref().is_some_and(|cut| !cut.is_drawn([x, y])) {
-                        continue;
-                    }
-                    let depth = origin + right * x + down * y;
-                    let depth = depth.clamp(least, greatest) as f32;
+                    let depth = plane.sample(base, at);
                     let is_later = number > numbers[s];
                     if depth > depths[s] + EQUAL || is_later && depth + EQUAL >= depths[s] {
-                        depths[s] = depth.max(depths[s]);
+                        depths[s] = if depth > depths[s] { depth } else { depths[s] };
                         numbers[s] = number;
                     }
                 }
@@ -107,28 +193,17 @@ impl<const N: usize> Nearest<N> {
     }
 }
 
-/// Whether a triangle may touch a sample of a pixel that is to be drawn. Most of the small ones do not.
-fn touches<const N: usize>(
-    pattern: &Pattern<N>,
-    corners: &[Corner; 3],
-    [width, height]: [usize; 2],
-    is_drawn: impl Fn(usize) -> bool,
-) -> bool {
-    // The samples of a pixel begin and end so far from its sides; corners are rounded.
-    let (first, last) = if pattern.len() == 1 { (0.48, 0.52) } else { (0.0, 1.0) };
-    let range = |at: [f64; 3], end: usize| {
-        let low = at[0].min(at[1]).min(at[2]) - last;
-        let high = at[0].max(at[1]).max(at[2]) - first;
-        (low.ceil().max(0.0) as usize, (high.floor().min(end as f64 - 1.0) + 1.0) as usize)
+/// Whether a triangle may touch a pixel that is to be drawn. Most of the small ones do not.
+fn touches(corners: &[Place; 3], [width, height]: [usize; 2], is_drawn: impl Fn(usize) -> bool) -> bool {
+    let range = |at: [i32; 3], count: usize| {
+        let low = i64::from(at[0].min(at[1]).min(at[2])).div_euclid(STEPS);
+        let high = i64::from(at[0].max(at[1]).max(at[2])).div_euclid(STEPS) + 1;
+        low.max(0) as usize..high.clamp(0, count as i64) as usize
     };
-    let (left, right) = range(corners.each_ref().map(|corner| corner.x), width);
-    let (top, bottom) = range(corners.each_ref().map(|corner| corner.y), height);
-    if left >= right || top >= bottom {
-        return false;
-    }
-    // Of a large one it is not worth the search.
-    let is_large = (right - left) * (bottom - top) > 256;
-    is_large || (top..bottom).any(|row| (left..right).any(|column| is_drawn(row * width + column)))
+    let columns = range(corners.each_ref().map(|corner| corner.x), width);
+    let mut rows = range(corners.each_ref().map(|corner| corner.y), height);
+    columns.len() * rows.len() > FEW
+        || rows.any(|row| columns.clone().any(|column| is_drawn(row * width + column)))
 }
 
 /// The weights of a triangle's corners in the middle of a pixel, or near it if that is outside.

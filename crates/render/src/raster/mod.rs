@@ -238,57 +238,6 @@ impl Oriented {
     }
 }
 
-/// A triangle, made ready.
-struct Triangle<const N: usize> {
-    /// First and last column and row of pixels that it may touch.
-    columns: [usize; 2],
-    rows: [usize; 2],
-    /// For each side the function `a x + b y + c` of a place in steps, which is not negative within: `[a, b, c]`; and
-    /// what makes it positive there, for places on the side itself belong to one of the two triangles that meet there.
-    sides: [[i64; 3]; 3],
-    bias: [i64; 3],
-    /// Value of each side's function at the samples, beside that at the upper left corner of the pixel.
-    at_samples: [[i64; N]; 3],
-    /// Depth at the upper left corner of the picture, its growth for a pixel to the right and down, and its bounds.
-    depth: [f64; 3],
-    depths: [f64; 2],
-}
-
-impl<const N: usize> Triangle<N> {
-    /// `None` if no sample can be in it.
-    fn new(pattern: &Pattern<N>, corners: [Corner; 3], width: usize, height: usize) -> Option<Triangle<N>> {
-        let triangle = Oriented::new(
-            corners.map(|corner| [snap(corner.x), snap(corner.y)]),
-            corners.map(|corner| corner.depth),
-        )?;
-        let Oriented { at, depths, area } = triangle;
-        let columns = range(at.map(|p| p[0]), width)?;
-        let rows = range(at.map(|p| p[1]), height)?;
-        let lines = triangle.sides();
-        let sides = lines.map(|Side { a, b, through: [x, y], .. }| [a, b, -(a * x + b * y)]);
-        let bias = lines.map(|side| side.bias);
-        let at_samples = sides.map(|[a, b, _]| {
-            pattern.map(|(x, y)| {
-                let place = |k: i64| (k + 8) * (STEPS / 16) + STEPS / 32;
-                a * place(x) + b * place(y)
-            })
-        });
-        let slope =
-            |i: usize| (0..3).map(|k| sides[k][i] as f64 * depths[k]).sum::<f64>() / area * STEPS as f64;
-        let (right, down) = (slope(0), slope(1));
-        let [x, y] = at[0].map(|x| x as f64 / STEPS as f64);
-        Some(Triangle {
-            columns,
-            rows,
-            sides,
-            bias,
-            at_samples,
-            depth: [depths[0] - right * x - down * y, right, down],
-            depths: triangle.reach(),
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,7 @@
 pub struct Mask<I, F, G> {
     /// Cells in a row of the raster.
     pub width: usize,
-    /// Whether a cell belongs to the set.
+    /// Whether a cell belongs to the set; none beyond the raster does.
     pub inside: I,
     /// The part of a cell that the set covers, from 0 to 1, or that its item does.
     pub covered: F,
@@ -46,6 +46,9 @@ struct Place {
 /// they should run under what is painted later.
 const TOLERANCE: f64 = 0.25;
 const TOLERANCE_INSIDE: f64 = 0.9;
+/// That at the edges of a strip, in parts of half its width; and the least one.
+const STRIP: f64 = 0.4;
+const LEAST_TOLERANCE: f64 = 0.02;
 const TOLERANCE_HIDDEN: f64 = 1.5;
 
 /// A corner of an outline, in cells from the upper left corner of the mask.
@@ -84,12 +87,24 @@ where
             _ => match (covered(inner, Part::Item), covered(outer, Part::Item)) {
                 // Where both are covered, it ends under what is painted later.
                 (_, b) if b > 0.99 => (0.5, TOLERANCE_HIDDEN),
-                (a, b) => (between(a, b), TOLERANCE),
+                (a, b) => self.edge([inner, outer], [a, b]),
             },
         };
         let [p, q] = [inner, outer].map(|cell| [cell % self.width, cell / self.width].map(|x| x as f64));
         let at = [0, 1].map(|k| p[k] + 0.5 + t * (q[k] - p[k]));
         Place { at, tolerance }
+    }
+
+    /// Where an item ends that covers these parts of two neighbours, from the centre of the inner one, and the tolerance there: so that
+    /// what is inside is as much as is covered. A part that lies between two ends is shared by them.
+    fn edge(&self, [inner, outer]: [usize; 2], [a, b]: [f64; 2]) -> (f64, f64) {
+        let step = outer.wrapping_sub(inner);
+        let is_strip = !(self.inside)(inner.wrapping_sub(step));
+        let is_gap = b > 0.0 && (self.inside)(outer.wrapping_add(step));
+        let own = if is_strip { a / 2.0 } else { a - 0.5 };
+        let t = (own + if is_gap { b / 2.0 } else { b }).clamp(-0.45, 1.45);
+        // A strip is not to vanish.
+        (t, if is_strip { TOLERANCE.min(t * STRIP).max(LEAST_TOLERANCE) } else { TOLERANCE })
     }
 
     /// The outline that begins with the upper edge of a cell, the set being on its right: between the centres of cells inside and
@@ -191,7 +206,12 @@ mod tests {
     fn mask(rows: &[&str]) -> Vec<Vec<Corner>> {
         let inside: Vec<bool> = rows.iter().flat_map(|row| row.bytes().map(|b| b == b'#')).collect();
         let covered = |i: usize, _| f64::from(u8::from(inside[i]));
-        let mask = Mask { width: rows[0].len(), inside: |i: usize| inside[i], covered, shade: |_| None };
+        let mask = Mask {
+            width: rows[0].len(),
+            inside: |i: usize| inside.get(i) == Some(&true),
+            covered,
+            shade: |_| None,
+        };
         outlines(&mask, inside.len())
     }
 
@@ -241,6 +261,25 @@ mod tests {
         let outlines = outlines(&Mask { width: 5, inside, covered, shade: |_| None }, 20);
         let right = outlines[0].iter().fold(0.0_f64, |right, p| right.max(p[0]));
         assert!((right - 2.75).abs() < 0.1, "{outlines:?}");
+    }
+
+    #[test]
+    fn a_narrow_strip_and_a_narrow_gap_are_as_wide_as_the_covered_parts_say() {
+        let row = |rows: &[usize], i: usize| rows.contains(&(i / 20)) && (1..19).contains(&(i % 20));
+        let strip = |i: usize| row(&[2], i);
+        let covered = |i: usize, _| if strip(i) { 0.4 } else { 0.0 };
+        let found = outlines(&Mask { width: 20, inside: strip, covered, shade: |_| None }, 100);
+        assert!(found.len() == 1 && (area(&found[0]) / 0.4 - 17.0).abs() <= 1.0, "{found:?}");
+
+        let sides = |i: usize| row(&[1, 2, 4, 5], i);
+        let covered = |i: usize, _| match i / 20 {
+            3 if row(&[3], i) => 0.7,
+            _ => f64::from(u8::from(sides(i))),
+        };
+        let found = outlines(&Mask { width: 20, inside: sides, covered, shade: |_| None }, 140);
+        let low = found[0].iter().fold(0.0_f64, |low, p| low.max(p[1]));
+        let high = found[1].iter().fold(9.0_f64, |high, p| high.min(p[1]));
+        assert!((high - low - 0.3).abs() < 1e-9, "{found:?}");
     }
 
     #[test]

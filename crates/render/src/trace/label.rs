@@ -2,21 +2,28 @@
 
 use std::collections::{HashMap, HashSet};
 
+use super::CELLS_PER_PIXEL;
+use super::memory::{Rasters, filled};
 use super::regions::{COVERED, NOTHING, Regions, Sample};
 use super::tones::{MOST, Tones};
 use crate::formats::png::Lit;
-use crate::raster::cells::{self, Nearest};
+use crate::raster::cells::{self, Given, Nearest};
 use crate::raster::{Pattern, SIXTEEN};
 use crate::triangles::Triangles;
 use dlsys_geometry::scene::{MaterialId, OwnerId};
 
-/// Shades between black and a colour as it is.
-const SHADES: f64 = 20.0;
+/// Shades between black and a colour as it is; and of what is so large in the picture that the steps between shades would show.
+const SHADES: u8 = 20;
+const FINE_SHADES: u8 = 60;
+/// What covers so many pixels is large.
+const LARGE: usize = 10_000;
+/// Of so many rows and columns one each is looked at to tell what is large.
+const APART: usize = 4;
 
 /// A region: cells of one item and one shade.
 pub struct Shade {
     pub item: Item,
-    /// The shade, in steps of 1/[`SHADES`]; 0 for all of a stem that is painted with a gradient.
+    /// The shade, in steps of one over the item's shades; 0 for all of a stem that is painted with a gradient.
     step: i32,
     /// The sum of the strengths of light in its cells, and their number.
     sum: f64,
@@ -43,6 +50,15 @@ pub struct Item {
     pub look: Look,
     pub stem: Option<u32>,
     pub tone: u8,
+    /// Shades between black and the colour as it is.
+    shades: u8,
+}
+
+impl Item {
+    /// The shade of a strength of light.
+    fn step(&self, strength: f64) -> i32 {
+        (strength * f64::from(self.shades)).round() as i32
+    }
 }
 
 /// The stems that are not painted by their shades: the looks that will be drawn as strokes over everything else, and the segments that
@@ -60,15 +76,25 @@ impl Stems {
         let look = (face.owner, face.material);
         let segment = mesh.segments.get(face.surface as usize).copied().flatten();
         let stem = segment.filter(|segment| self.gradients.contains(segment));
-        (segment.is_none() || !self.strokes.contains(&look)).then_some(Item { look, stem, tone: 0 })
+        (segment.is_none() || !self.strokes.contains(&look)).then_some(Item {
+            look,
+            stem,
+            tone: 0,
+            shades: SHADES,
+        })
     }
 }
 
 /// The number of the nearest triangle in the middle of each cell plus 1, or 0; and its depth.
-pub fn nearest(mesh: &Triangles, lit: &Lit, [width, height]: [usize; 2]) -> Nearest<1> {
-    let count = mesh.faces.len();
-    let triangles = (count, |n| lit.corners(n), |n| lit.cut(n, 1));
-    cells::nearest(&cells::MIDDLE, [width, height], triangles, (width * height, |cell| cell), |_| true)
+pub fn nearest(mesh: &Triangles, lit: &Lit, size: [usize; 2], rasters: &mut Rasters) -> Nearest<1> {
+    let cells = size[0] * size[1];
+    let numbers = filled(&mut rasters.numbers, cells, [0]);
+    let empty = Nearest { numbers, depths: filled(&mut rasters.depths, cells, [f32::NEG_INFINITY]) };
+    cells::in_middles(
+        size,
+        &Given { count: mesh.faces.len(), corners: |n| lit.snapped(n), cut: |n| lit.cut(n, 1) },
+        empty,
+    )
 }
 
 /// The raster of regions, and their shades by number. Regions are painted in the order of modules, materials and shades.
@@ -80,15 +106,19 @@ pub fn label(
     [width, height]: [usize; 2],
     (stems, tones): (&Stems, &Tones),
     is_fine: bool,
+    rasters: &mut Rasters,
 ) -> (Regions, Vec<Shade>) {
     // Regions are numbered as they are found, then in the order of painting.
     let mut shades: Vec<Shade> = Vec::new();
     let mut known: HashMap<(Item, i32), u32> = HashMap::new();
     let mut last = None;
-    let mut labels = vec![NOTHING; numbers.len()];
-    let item_of: Vec<Option<Item>> = (0..mesh.faces.len()).map(|n| stems.item(mesh, n)).collect();
+    let mut labels = filled(&mut rasters.labels, numbers.len(), NOTHING);
+    let mut item_of: Vec<Option<Item>> = (0..mesh.faces.len()).map(|n| stems.item(mesh, n)).collect();
+    let large = if is_fine { (CELLS_PER_PIXEL * CELLS_PER_PIXEL) as usize * LARGE } else { LARGE };
+    shade_finely(mesh, &mut item_of, numbers, width, large);
     let has_shades = |n: usize| item_of[n].is_some_and(|item| item.stem.is_none());
-    let strengths = strengths(lit, numbers, width, has_shades);
+    let strengths = filled(&mut rasters.strengths, numbers.len(), 0.0);
+    let strengths = lit_cells(lit, numbers, width, has_shades, strengths);
     for (cell, label) in labels.iter_mut().enumerate() {
         let Some(n) = (numbers[cell][0] as usize).checked_sub(1) else { continue };
         let Some(mut item) = item_of[n] else {
@@ -100,7 +130,7 @@ pub fn label(
             item.tone = tones.nearest(item.look.1, color);
         }
         let strength = f64::from(strengths[cell]);
-        let step = step_of(strength);
+        let step = item.step(strength);
         let key = (item, step);
         let number = match last {
             Some((same, number)) if same == key => number,
@@ -123,7 +153,8 @@ pub fn label(
     shades.sort_by_key(Shade::key);
 
     let (items, of_item) = items(&shades);
-    let (places, chosen) = edges(&labels, &items, &shades, width);
+    let empty = filled(&mut rasters.places, labels.len(), 0);
+    let (places, chosen) = edges(&labels, &items, &shades, width, empty);
     let at_edges =
         Edges { lit, numbers, width, height, places: &places, count: chosen, tones, of_item: &of_item };
     // Faces of one item follow one another.
@@ -146,9 +177,38 @@ pub fn label(
         false => at_edges.samples(&SIXTEEN, &face_items),
     };
     let per_cell = if is_fine { cells::EIGHT.len() } else { SIXTEEN.len() };
-    let least = shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / SHADES).collect();
+    let least =
+        shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / f64::from(shade.item.shades)).collect();
     let steps = shades.iter().map(|shade| shade.step).collect();
     (Regions { width, labels, places, samples, per_cell, items, steps, strengths, least }, shades)
+}
+
+/// Gives more shades to the looks of surfaces that cover more than so many cells each. Triangles of one look follow one another, and so do
+/// those of one surface.
+fn shade_finely(
+    mesh: &Triangles,
+    items: &mut [Option<Item>],
+    numbers: &[[u32; 1]],
+    width: usize,
+    large: usize,
+) {
+    let mut covered = vec![0; items.len() + 1];
+    for row in numbers.chunks(width).step_by(APART) {
+        row.iter().step_by(APART).for_each(|[number]| covered[*number as usize] += APART * APART);
+    }
+    let mut first = 0;
+    for run in items.chunk_by_mut(|a, b| a.map(|item| item.look) == b.map(|item| item.look)) {
+        let mut largest = 0;
+        for surface in mesh.faces[first..first + run.len()].chunk_by(|a, b| a.surface == b.surface) {
+            // Those of no triangle come before all others.
+            let cells: usize = covered[first + 1..].iter().take(surface.len()).sum();
+            first += surface.len();
+            largest = cells.max(largest);
+        }
+        if largest > large {
+            run.iter_mut().flatten().for_each(|item| item.shades = FINE_SHADES);
+        }
+    }
 }
 
 /// The item of a triangle without its tone, the number of that with some tone, and whether it has shades.
@@ -158,7 +218,7 @@ struct FaceItem {
     has_shades: bool,
 }
 
-/// Cells at the edges of items and at creases: those that have a place below `count`.
+/// Cells at the edges of items and at creases: those that have a place, from 1 to `count`.
 struct Edges<'a> {
     lit: &'a Lit<'a>,
     /// The nearest triangle in the middle of each cell, by number plus 1.
@@ -174,12 +234,16 @@ struct Edges<'a> {
 impl Edges<'_> {
     /// What is seen at the samples of these cells, one cell after another.
     fn samples<const N: usize>(&self, pattern: &Pattern<N>, items: &[FaceItem]) -> Vec<Sample> {
-        let place = |cell: usize| self.places[cell] as usize;
+        // Cells without a place come after all others.
+        let place = |cell: usize| (self.places[cell] as usize).wrapping_sub(1);
         let corners = |n: usize| self.lit.corners(n);
         let mut in_front = vec![false; items.len() + 1];
         self.numbers.iter().for_each(|[number]| in_front[*number as usize] = true);
-        let (triangles, size) = ((items.len(), corners, |n| self.lit.cut(n, N)), [self.width, self.height]);
-        let seen = cells::nearest(pattern, size, triangles, (self.count, place), |n| in_front[n + 1]).numbers;
+        let triangles =
+            Given { count: items.len(), corners: |n| self.lit.snapped(n), cut: |n| self.lit.cut(n, N) };
+        let size = [self.width, self.height];
+        let seen =
+            cells::at_samples(pattern, size, &triangles, (self.count, place), |n| in_front[n + 1]).numbers;
         let sample = |number: u32, cell: usize| {
             let Some(n) = (number as usize).checked_sub(1) else { return Sample { item: NOTHING, step: 0 } };
             let FaceItem { number: item, has_shades, .. } = items[n];
@@ -187,8 +251,9 @@ impl Edges<'_> {
                 return Sample { item, step: 0 };
             }
             let weights = cells::weights(corners(n), [cell % self.width, cell / self.width]);
-            let item = self.toned(n, &items[n], weights);
-            Sample { item, step: step_of(self.lit.strength(n, weights)) }
+            let strength = self.lit.strength(n, weights);
+            let step = items[n].item.map_or(0, |item| item.step(strength));
+            Sample { item: self.toned(n, &items[n], weights), step }
         };
         let mut samples = Vec::with_capacity(self.count * N);
         let mut known: Vec<(u32, Sample)> = Vec::with_capacity(N);
@@ -226,9 +291,14 @@ fn clear_rim(labels: &mut [u32], width: usize) {
     labels[..width].fill(NOTHING);
 }
 
-/// The strengths of light in the middles of cells whose triangles have shades, else 0. Between two cells of one triangle it is their mean.
-fn strengths(lit: &Lit, numbers: &[[u32; 1]], width: usize, has_shades: impl Fn(usize) -> bool) -> Vec<f32> {
-    let mut strengths = vec![0.0_f32; numbers.len()];
+/// The strengths of light in the middles of cells whose triangles have shades; they are 0 before. Between two cells of one triangle it is their mean.
+fn lit_cells(
+    lit: &Lit,
+    numbers: &[[u32; 1]],
+    width: usize,
+    has_shades: impl Fn(usize) -> bool,
+    mut strengths: Vec<f32>,
+) -> Vec<f32> {
     let height = numbers.len() / width.max(1);
     // Rows with even numbers first, then those between.
     for first in [0, 1] {
@@ -261,11 +331,6 @@ fn strengths(lit: &Lit, numbers: &[[u32; 1]], width: usize, has_shades: impl Fn(
     strengths
 }
 
-/// The shade of a strength of light.
-fn step_of(strength: f64) -> i32 {
-    (strength * SHADES).round() as i32
-}
-
 /// The item (module and material) of each region, by number in the order of painting; and the number of each item.
 fn items(shades: &[Shade]) -> (Vec<u32>, HashMap<Item, u32>) {
     let mut numbers: HashMap<Item, u32> = HashMap::new();
@@ -277,17 +342,27 @@ fn items(shades: &[Shade]) -> (Vec<u32>, HashMap<Item, u32>) {
     (items, numbers)
 }
 
-/// For each cell beside one of another item, or of a shade that is not the next one, its number among these cells, else a number that is greater than any; and their
+/// For each cell beside one of another item, or of a shade that is not the next one, its number among these cells from 1 on, else 0; and their
 /// count.
-fn edges(labels: &[u32], items: &[u32], shades: &[Shade], width: usize) -> (Vec<u32>, usize) {
+fn edges(
+    labels: &[u32],
+    items: &[u32],
+    shades: &[Shade],
+    width: usize,
+    mut places: Vec<u32>,
+) -> (Vec<u32>, usize) {
     let item = |label: u32| items.get(label as usize).copied();
     let step = |label: u32| shades.get(label as usize).map_or(0, |shade| shade.step);
-    let mut places = vec![u32::MAX; labels.len()];
+    // As far apart as two of the coarse shades.
+    let is_crease = |p: u32, q: u32| {
+        let fine = shades.get(p as usize).map_or(1, |shade| u32::from(shade.item.shades / SHADES));
+        step(p).abs_diff(step(q)) > fine
+    };
     let mut mark = |a: usize, b: usize| {
         // Most neighbours are of one region.
         let [p, q] = [labels[a], labels[b]];
-        if p != q && (item(p) != item(q) || step(p).abs_diff(step(q)) > 1) {
-            (places[a], places[b]) = (0, 0);
+        if p != q && (item(p) != item(q) || is_crease(p, q)) {
+            (places[a], places[b]) = (1, 1);
         }
     };
     // The cells around the raster are empty, so the first of a row may be compared with the last of the row before.
@@ -298,9 +373,9 @@ fn edges(labels: &[u32], items: &[u32], shades: &[Shade], width: usize) -> (Vec<
         mark(cell - width, cell);
     }
     let mut count = 0;
-    for place in places.iter_mut().filter(|place| **place == 0) {
-        *place = count;
+    for place in places.iter_mut().filter(|place| **place != 0) {
         count += 1;
+        *place = count;
     }
     (places, count as usize)
 }

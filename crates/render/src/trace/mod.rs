@@ -16,22 +16,29 @@
 mod contour;
 mod hidden;
 mod label;
+mod memory;
 mod regions;
 mod tones;
 
+use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 
-use super::formats::png::{Lit, sides};
+use super::Fit;
+use super::formats::png::Lit;
 use super::name::Names;
 use super::number;
 use super::painter::Style;
 use super::stroke::{Stroke, Strokes, is_thin, pixels_across};
-use super::triangles::{self, Triangles};
+use super::triangles::{Solid, Triangles};
+use super::tube::{TubeStyle, Tubes, sides_for};
 use contour::Corner;
-use dlsys_geometry::scene::{Face, OwnerId, Scene, Segment};
+use dlsys_geometry::scene::{Face, OwnerId, Point, Scene, Segment};
 use hidden::Visible;
 use label::{Look, Stems};
+pub(super) use memory::Memory;
+use memory::Rasters;
+use regions::Regions;
 use tones::Tones;
 
 /// Cells for each pixel of the page, along a side.
@@ -39,6 +46,10 @@ const CELLS_PER_PIXEL: f64 = 2.0;
 /// Least and most cells on the larger side of a picture.
 const LEAST_CELLS: f64 = 1000.0;
 const MOST_CELLS: f64 = 4000.0;
+/// Greatest distance of tubes from round ones, in cells; most sides of one; and about how many triangles all of them may have.
+const ROUNDNESS: f64 = 0.2;
+const MOST_SIDES: usize = 64;
+const MOST_TRIANGLES: usize = 4_000_000;
 /// A scene of so few triangles has no small parts, so one cell for each pixel of the page is enough.
 const PLAIN: usize = 2000;
 /// Stems wider than this many pixels of the page are regions, because their bends and domes have shades of their own.
@@ -58,7 +69,7 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     };
     let finest = cell_of(CELLS_PER_PIXEL);
     let has_triangles = |segment: &Segment| pixels_across(segment, style) >= LEAST_PIXELS;
-    let mesh = triangles::triangles(scene, style.fit, sides(scene, style.fit, 1.0 / finest), has_triangles);
+    let mesh = mesh(scene, style.fit, 1.0 / finest, has_triangles);
     let is_fine = mesh.faces.len() > PLAIN;
     let cell = if is_fine { finest } else { cell_of(1.0) };
     let [a, b, c] = [1.0 / cell, -left / cell, (bottom + height) / cell];
@@ -68,13 +79,16 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let placement = [a, b - low[0], c - low[1]];
     lit.shift(low);
     let size = size.map(|side| side as usize);
-    let nearest = label::nearest(&mesh, &lit, size);
+    let mut rasters = style.memory.map(Memory::take).unwrap_or_default();
+    let nearest = label::nearest(&mesh, &lit, size, &mut rasters);
     let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };
     let stems = stems(scene, style, &visible, lit.lighting().is_declared());
     let tones = Tones::of(&scene.palette);
-    let (mut regions, shades) = label::label(&mesh, &lit, &nearest.numbers, size, (&stems, &tones), is_fine);
+    let (mut regions, shades) =
+        label::label(&mesh, &lit, &nearest.numbers, size, (&stems, &tones), is_fine, &mut rasters);
+    regions.with_narrow_parts();
     regions.without_specks();
-    let outlines = regions.outlines(shades.len());
+    let outlines = regions.outlines(shades.len(), &mut rasters);
     visible.labels = &regions.labels;
 
     let unit = cell * style.scale;
@@ -110,7 +124,25 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     };
     page.groups(&paths);
     let order = (0..scene.segments.len()).filter(|i| is_stroke(&scene.segments[*i])).collect();
-    page.with_strokes(scene, order, strokes, &visible)
+    let elements = page.with_strokes(scene, order, strokes, &visible);
+    if let Some(memory) = style.memory {
+        let Regions { labels, places, strengths, .. } = regions;
+        let (numbers, depths) = (nearest.numbers, nearest.depths);
+        memory.keep(Rasters { numbers, depths, labels, places, strengths, ..rasters });
+    }
+    elements
+}
+
+/// Everything in a scene as triangles, in string order, as round as so many cells for a scene unit show; stems if they are to be `kept`.
+fn mesh(scene: &Scene, fit: &Fit, scale: f64, kept: impl Fn(&Segment) -> bool) -> Triangles {
+    let affordable = (MOST_TRIANGLES / (2 * scene.segments.len().max(1))).clamp(4, MOST_SIDES);
+    let sides = |radius: f64, at: Point| {
+        let nearer = fit.camera.magnification(fit.camera.project(at).z);
+        sides_for(radius * scale * nearer, ROUNDNESS).min(affordable)
+    };
+    let style = TubeStyle { floor: scene.surroundings.floor, ..fit.tubes() };
+    let tubes = Tubes::of(scene, style, sides, |_| true);
+    Triangles::of(&Solid::of(scene, tubes, Cow::Borrowed(&scene.surfaces)), kept)
 }
 
 /// The rectangle of cells that triangles touch, within a picture of this size, and a cell around it, which may be outside of the picture:

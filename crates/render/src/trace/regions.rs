@@ -5,9 +5,14 @@
 //! needed once only. A region is worked on piece by piece (cells that hang together), and the work on a piece is that of its cells.
 
 use super::contour::{Corner, Mask, Part};
+use super::memory::{Rasters, filled};
 
 /// The width of the margin, in cells.
 const MARGIN: usize = 3;
+/// What has so many of the eight cells around a cell, or fewer, is narrow there.
+const FEW: usize = 2;
+/// By how much light is stronger than the least of a region, so that it is within it: less than half of the finest step.
+const WITHIN: f64 = 0.004;
 
 /// No region.
 pub const NOTHING: u32 = u32::MAX;
@@ -28,7 +33,7 @@ pub struct Regions {
     pub width: usize,
     /// By cell; [`NOTHING`] for the background, [`COVERED`] where something else is drawn.
     pub labels: Vec<u32>,
-    /// By cell: its place among those with `per_cell` samples, if it is at the edge of an item or at a crease; or anything greater.
+    /// By cell: its place among those with `per_cell` samples, from 1 on, if it is at the edge of an item or at a crease; else 0.
     pub places: Vec<u32>,
     pub samples: Vec<Sample>,
     pub per_cell: usize,
@@ -76,63 +81,136 @@ impl Regions {
         changes.into_iter().for_each(|(cell, label)| self.labels[cell] = label);
     }
 
+    /// Gives cells to the narrow things in them, which the middles of most cells miss: to what has a quarter of a cell's samples, but few
+    /// cells around it. So what is narrow hangs together; how wide it is, the samples say. A gap is such a thing, too.
+    pub fn with_narrow_parts(&mut self) {
+        let rows = self.labels.len() / self.width.max(1);
+        let mut changes = Vec::new();
+        for row in 1..rows.saturating_sub(1) {
+            for cell in row * self.width + 1..(row + 1) * self.width - 1 {
+                if let Some(label) = self.samples_of(cell).and_then(|samples| self.narrow_part(cell, samples))
+                {
+                    changes.push((cell, label));
+                }
+            }
+        }
+        for (cell, label) in changes {
+            self.labels[cell] = label;
+            if let Some(least) = self.least.get(label as usize) {
+                self.strengths[cell] = (least + WITHIN) as f32;
+            }
+        }
+    }
+
+    /// The region of the narrow thing in a cell, if there is one.
+    fn narrow_part(&self, cell: usize, samples: &[Sample]) -> Option<u32> {
+        let item = |label: u32| self.items.get(label as usize).copied().unwrap_or(label);
+        let own = item(self.labels[cell]);
+        let around = self.around(cell).into_iter().chain(self.corners(cell));
+        let mut others = [0; 8];
+        others.iter_mut().zip(around).for_each(|(other, cell)| *other = item(self.labels[cell]));
+        let near = |item: u32| others.iter().filter(|other| **other == item).count();
+        if own == COVERED || near(own) < FEW {
+            return None;
+        }
+        let mut found: Option<(usize, u32, i32)> = None;
+        for (i, Sample { item, step }) in samples.iter().enumerate() {
+            if *item == own || *item == COVERED || samples[..i].iter().any(|other| other.item == *item) {
+                continue;
+            }
+            let (count, near) = (samples.iter().filter(|other| other.item == *item).count(), near(*item));
+            if 4 * count >= samples.len() && near <= FEW && found.is_none_or(|(least, ..)| near < least) {
+                found = Some((near, *item, *step));
+            }
+        }
+        let (_, item, step) = found?;
+        Some(if item == NOTHING { NOTHING } else { self.region(item, step)? })
+    }
+
+    /// The region of an item whose shade is next to one.
+    fn region(&self, item: u32, step: i32) -> Option<u32> {
+        let first = self.items.partition_point(|other| *other < item);
+        let end = self.items.partition_point(|other| *other <= item);
+        let last = end.checked_sub(1).filter(|last| *last >= first)?;
+        let next = first + self.steps[first..end].partition_point(|other| *other < step);
+        Some(next.min(last) as u32)
+    }
+
+    /// What is seen at the samples of a cell at an edge.
+    fn samples_of(&self, cell: usize) -> Option<&[Sample]> {
+        let first = (self.places[cell] as usize).checked_sub(1)? * self.per_cell;
+        self.samples.get(first..first + self.per_cell)
+    }
+
     /// The outlines of `count` regions, by number, in cells from the upper left corner.
-    pub fn outlines(&self, count: usize) -> Vec<Vec<Vec<Corner>>> {
+    pub fn outlines(&self, count: usize, rasters: &mut Rasters) -> Vec<Vec<Vec<Corner>>> {
         let cells = self.labels.len();
-        let none = || vec![0; cells];
-        let mut marks = Marks { inside: none(), begun: none(), seen: none(), holes: 0 };
-        let mut is_done = vec![false; cells];
+        let [inside, begun, seen] = rasters.marks.each_mut().map(|kept| filled(kept, cells, 0));
+        let mut marks = Marks { inside, begun, seen, holes: 0 };
+        let mut is_done = filled(&mut rasters.is_done, cells, false);
         let mut outlines = vec![Vec::new(); count];
         let mut pieces = 0;
-        let mut piece = Vec::new();
+        let (mut piece, mut rim) = (Vec::new(), Vec::new());
         for first in 0..cells {
             if is_done[first] || self.labels[first] >= COVERED {
                 continue;
             }
             pieces += 1;
-            self.gather(first, pieces, &mut is_done, &mut marks.inside, &mut piece);
-            self.spread(pieces, &mut marks.inside, &mut piece);
-            outlines[self.labels[first] as usize].append(&mut self.outlines_of(pieces, &piece, &mut marks));
+            self.gather(first, pieces, &mut is_done, &mut marks.inside, [&mut piece, &mut rim]);
+            self.spread(self.labels[first], pieces, &mut marks.inside, &mut rim);
+            outlines[self.labels[first] as usize].append(&mut self.outlines_of(
+                self.labels[first],
+                pieces,
+                &rim,
+                &mut marks,
+            ));
         }
+        rasters.marks = [marks.inside, marks.begun, marks.seen];
+        rasters.is_done = is_done;
         outlines
     }
 
-    /// The cells of a region that hang together with one of them, marked with a number.
+    /// The cells of a region that hang together with one of them, marked with a number; and those of them at its rim.
     fn gather(
         &self,
         first: usize,
         number: u32,
         is_done: &mut [bool],
         inside: &mut [u32],
-        piece: &mut Vec<usize>,
+        [piece, rim]: [&mut Vec<usize>; 2],
     ) {
+        let label = self.labels[first];
         piece.clear();
+        rim.clear();
         piece.push(first);
         (is_done[first], inside[first]) = (true, number);
         let mut next = 0;
         while let Some(&cell) = piece.get(next) {
             next += 1;
-            for other in self.around(cell).into_iter().chain(self.corners(cell)) {
-                if !is_done[other] && self.labels[other] == self.labels[first] {
+            let beside = self.around(cell);
+            for other in beside.into_iter().chain(self.corners(cell)) {
+                if self.labels[other] == label && !is_done[other] {
                     (is_done[other], inside[other]) = (true, number);
                     piece.push(other);
                 }
             }
+            if beside.into_iter().any(|other| self.labels[other] != label) {
+                rim.push(cell);
+            }
         }
     }
 
-    /// Adds the cells near a piece that are painted later. Other pieces of the region have the same colour, so it does not matter which of
-    /// the two covers a cell.
-    fn spread(&self, number: u32, inside: &mut [u32], piece: &mut Vec<usize>) {
-        let label = self.labels[piece[0]];
+    /// Adds the cells near the rim of a piece that are painted later. Other pieces of the region have the same colour, so it does not matter
+    /// which of the two covers a cell.
+    fn spread(&self, label: u32, number: u32, inside: &mut [u32], rim: &mut Vec<usize>) {
         let mut from = 0;
         for _ in 0..MARGIN {
-            let end = piece.len();
+            let end = rim.len();
             for at in from..end {
-                for other in self.around(piece[at]) {
+                for other in self.around(rim[at]) {
                     if inside[other] != number && self.is_free(other, label) {
                         inside[other] = number;
-                        piece.push(other);
+                        rim.push(other);
                     }
                 }
             }
@@ -168,18 +246,14 @@ impl Regions {
         true
     }
 
-    fn outlines_of(&self, number: u32, piece: &[usize], marks: &mut Marks) -> Vec<Vec<Corner>> {
-        let label = self.labels[piece[0]];
+    /// The outlines of a piece, all of which begin at one of these cells.
+    fn outlines_of(&self, label: u32, number: u32, rim: &[usize], marks: &mut Marks) -> Vec<Vec<Corner>> {
         let (item, step) = (self.items[label as usize], self.steps[label as usize]);
         let mut outlines = Vec::new();
-        for &cell in piece {
+        for &cell in rim {
             let Marks { inside, begun, .. } = marks;
             // The part of a cell that this region covers, or one that is painted later.
-            let samples_of = |cell: usize| {
-                let first = self.places[cell] as usize * self.per_cell;
-                self.samples.get(first..first + self.per_cell)
-            };
-            let covered = |cell: usize, part: Part| match samples_of(cell) {
+            let covered = |cell: usize, part: Part| match self.samples_of(cell) {
                 Some(samples) => {
                     let least = if part == Part::Shade { step } else { i32::MIN };
                     let is_covered = |at: &&Sample| at.item != NOTHING && (at.item, at.step) >= (item, least);
@@ -191,7 +265,8 @@ impl Regions {
                 let is_own = self.items.get(self.labels[cell] as usize) == Some(&item);
                 is_own.then(|| f64::from(self.strengths[cell]) - self.least[label as usize])
             };
-            let mask = Mask { width: self.width, inside: |cell| inside[cell] == number, covered, shade };
+            let mask =
+                Mask { width: self.width, inside: |cell| inside.get(cell) == Some(&number), covered, shade };
             if begun[cell] == number || !mask.is_top(cell) {
                 continue;
             }
@@ -227,7 +302,7 @@ mod tests {
         let rows: Vec<&str> =
             [&rim[..]].into_iter().chain(rows.iter().map(String::as_str)).chain([&rim[..]]).collect();
         let labels: Vec<u32> = rows.iter().flat_map(|row| row.bytes().map(label)).collect();
-        let places = vec![u32::MAX; labels.len()];
+        let places = vec![0; labels.len()];
         let items = (0..10).collect();
         let (width, strengths) = (rim.len(), vec![0.0; labels.len()]);
         Regions {
@@ -247,7 +322,7 @@ mod tests {
     fn a_region_reaches_under_those_that_come_later_and_has_no_holes_for_them() {
         let of =
             regions(&["0000000000", "0111111110", "0111111110", "0111221110", "0111111110", "0000000000"]);
-        let outlines = of.outlines(3);
+        let outlines = of.outlines(3, &mut Rasters::default());
         assert_eq!(outlines.iter().map(Vec::len).collect::<Vec<_>>(), [1, 1, 1], "{outlines:?}");
         let reach = |outline: &[Corner]| outline.iter().fold(0.0_f64, |reach, p| reach.max(p[0]));
         assert!(reach(&outlines[0][0]) > 10.0 && (reach(&outlines[1][0]) - 10.0).abs() < 0.6);
@@ -255,7 +330,8 @@ mod tests {
 
     #[test]
     fn what_comes_earlier_stays_open() {
-        let outlines = regions(&["11111", "11011", "11011", "11011", "11111"]).outlines(2);
+        let outlines =
+            regions(&["11111", "11011", "11011", "11011", "11111"]).outlines(2, &mut Rasters::default());
         assert_eq!(outlines[1].len(), 2, "an outline and its hole: {outlines:?}");
     }
 
@@ -263,7 +339,8 @@ mod tests {
     fn a_hole_with_something_earlier_in_its_midst_stays_open() {
         let ring = |inner: &str| {
             let midst = format!("12222{inner}22221");
-            regions(&["11111111111", "12222222221", &midst, "12222222221", "11111111111"]).outlines(3)
+            regions(&["11111111111", "12222222221", &midst, "12222222221", "11111111111"])
+                .outlines(3, &mut Rasters::default())
         };
         assert_eq!((ring("2")[1].len(), ring("0")[1].len()), (1, 2));
     }
@@ -274,7 +351,28 @@ mod tests {
         let mut cleaned = of();
         cleaned.without_specks();
         assert_eq!(cleaned.labels, of().labels);
-        assert_eq!(of().outlines(3)[0].len(), 1);
+        assert_eq!(of().outlines(3, &mut Rasters::default())[0].len(), 1);
+    }
+
+    #[test]
+    fn a_narrow_part_hangs_together_though_most_middles_miss_it() {
+        let mut of = regions(&["0000000", "0100010", "0000000"]);
+        of.per_cell = 4;
+        let row = 2 * of.width;
+        for (place, cell) in (1..).zip(row + 3..row + 6) {
+            of.places[cell] = place;
+            let sample = |item| Sample { item, step: 0 };
+            of.samples.extend([1, 0, 0, 0].map(sample));
+        }
+        of.with_narrow_parts();
+        assert_eq!(of.labels[row + 2..row + 7], [1; 5]);
+        assert_eq!(of.outlines(2, &mut Rasters::default())[1].len(), 1);
+        // What is as wide as it has cells around is none.
+        let mut wide = regions(&["1111111", "0000000", "0000000"]);
+        (wide.per_cell, wide.places[row + 3]) = (4, 1);
+        wide.samples = [1, 1, 0, 0].map(|item| Sample { item, step: 0 }).to_vec();
+        wide.with_narrow_parts();
+        assert_eq!(wide.labels[row + 3], 0);
     }
 
     #[test]
