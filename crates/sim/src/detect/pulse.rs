@@ -65,6 +65,8 @@ pub struct ExaminedStep<'p> {
     pub nodes: &'p [f64],
     /// The dense output, if the module is integrated alone; else it is that of the coupled modules.
     pub own: Option<&'p Dense>,
+    /// The rates at the start, if that is one of the nodes and the module is integrated alone.
+    pub at_start: Option<&'p [f64]>,
     /// The largest contribution to the values that may be overlooked.
     pub tolerance: f64,
     /// The equations are stiff: states are held at the middle of each piece.
@@ -92,6 +94,15 @@ impl PulseDetector {
     pub fn examine(&mut self, step: &ExaminedStep) -> PulseFinding {
         let all = step.end.since(step.start);
         let rates = if step.state.numeric_only { &step.solve.rates } else { &step.solve.numeric_rates };
+        self.seen.clear();
+        self.seen.resize(rates.outputs(), 0.0);
+        // Most rates change so little over a step that those at its start tell enough.
+        if let Some(at_start) = step.at_start {
+            self.seen.iter_mut().zip(at_start).for_each(|(seen, rate)| *seen = rate.abs());
+            if self.is_plain(step, rates, all) {
+                return PulseFinding::Clear;
+            }
+        }
         self.sample(step, rates, all);
         let values = &step.solve.algebraic.values;
         let explicit = values.outputs() > 0 && step.solve.algebraic.explicit.iter().all(|e| *e);
@@ -126,10 +137,18 @@ impl PulseDetector {
         PulseFinding::Clear
     }
 
+    /// True for a step of a module that is integrated alone whose rates are bounded over the whole of it by what has been seen.
+    fn is_plain(&mut self, step: &ExaminedStep, rates: &Program, all: f64) -> bool {
+        if step.solve.algebraic.values.outputs() > 0 {
+            return false;
+        }
+        let path = Path::of_equations(step.world, step.state, step.rule, (step.start, all), step.own);
+        self.bound(&path, rates, (0.0, 1.0), step.stiff);
+        self.bounds_out.iter().zip(&self.seen).all(|(bounds, seen)| bounds.magnitude() <= SURPRISE * seen)
+    }
+
     /// Evaluates the rates at the stages of the method, and keeps the largest size of each.
     fn sample(&mut self, step: &ExaminedStep, rates: &Program, all: f64) {
-        self.seen.clear();
-        self.seen.resize(rates.outputs(), 0.0);
         self.out.resize(rates.outputs(), 0.0);
         for node in step.nodes {
             let at = (step.start.after(node * all), 0.0);
@@ -139,6 +158,21 @@ impl PulseDetector {
             for (seen, value) in self.seen.iter_mut().zip(&self.out) {
                 *seen = seen.max(value.abs());
             }
+        }
+    }
+
+    /// Bounds a program from one position of a path to another. If `held`, states are those of the middle.
+    fn bound(&mut self, path: &Path, program: &Program, (lo, hi): (f64, f64), held: bool) {
+        self.bounds_out.resize(program.outputs(), Interval::EMPTY);
+        path.everything_over(lo, hi, held, &mut self.bounds);
+        if path.world.stretch.is_finite() {
+            self.held.clear();
+            self.held.extend(self.bounds.iter().copied().map(Held));
+            self.held_out.resize(program.outputs(), Held(Interval::EMPTY));
+            program.eval(&self.held, &mut self.held_scratch, &mut self.held_out);
+            self.bounds_out.iter_mut().zip(&self.held_out).for_each(|(out, held)| *out = held.0);
+        } else {
+            program.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
         }
     }
 
@@ -152,22 +186,12 @@ impl PulseDetector {
         part: f64,
         step: &ExaminedStep,
     ) -> PulseFinding {
-        self.bounds_out.resize(program.outputs(), Interval::EMPTY);
         let mut stack: SmallVec<[(f64, f64); 16]> = SmallVec::new();
         stack.push((0.0, 1.0));
         let mut pieces = 0;
         while let Some((lo, hi)) = stack.pop() {
             pieces += 1;
-            path.everything_over(lo, hi, step.stiff, &mut self.bounds);
-            if path.world.stretch.is_finite() {
-                self.held.clear();
-                self.held.extend(self.bounds.iter().copied().map(Held));
-                self.held_out.resize(program.outputs(), Held(Interval::EMPTY));
-                program.eval(&self.held, &mut self.held_scratch, &mut self.held_out);
-                self.bounds_out.iter_mut().zip(&self.held_out).for_each(|(out, held)| *out = held.0);
-            } else {
-                program.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
-            }
+            self.bound(path, program, (lo, hi), step.stiff);
             let (mut surprising, mut bounded) = (false, true);
             for (bounds, seen) in self.bounds_out.iter().zip(&self.seen) {
                 let size = bounds.magnitude();
