@@ -68,18 +68,31 @@ pub type Lanes = [f64; LANES];
 /// Lanes that fit into the processor's registers together, so that the result may overwrite an operand without a copy.
 const PART: usize = 8;
 
-/// Applies an operation to the lanes, part by part.
+/// Applies an operation to the first `PARTS` parts of the lanes.
 #[inline(always)]
-fn each(registers: &mut [Lanes], parts: usize, [to, a, b]: [Register; 3], f: impl Fn(f64, f64) -> f64) {
-    let part = |of: Register, registers: &[Lanes], i: usize| -> [f64; PART] {
-        registers[of as usize].as_chunks::<PART>().0[i]
-    };
-    for i in 0..parts.min(LANES / PART) {
-        let (mut x, y) = (part(a, registers, i), part(b, registers, i));
+fn each<const PARTS: usize>(registers: &mut [Lanes], [to, a, b]: [Register; 3], f: impl Fn(f64, f64) -> f64) {
+    let [to, a, b] = [to, a, b].map(|register| register as usize);
+    // Looked at once, not for every part.
+    assert!(to < registers.len() && a < registers.len() && b < registers.len());
+    for i in 0..PARTS {
+        let [mut x, y] = [a, b].map(|register| registers[register].as_chunks::<PART>().0[i]);
         for (x, y) in x.iter_mut().zip(y) {
             *x = f(*x, y);
         }
-        registers[to as usize].as_chunks_mut::<PART>().0[i] = x;
+        registers[to].as_chunks_mut::<PART>().0[i] = x;
+    }
+}
+
+/// The same for operations that take so long that all else counts little.
+#[inline(never)]
+fn each_of(
+    registers: &mut [Lanes],
+    rows: usize,
+    [to, a, b]: [Register; 3],
+    f: &mut dyn FnMut(f64, f64) -> f64,
+) {
+    for i in 0..rows {
+        registers[to as usize][i] = f(registers[a as usize][i], registers[b as usize][i]);
     }
 }
 
@@ -296,6 +309,12 @@ impl Program {
         })
     }
 
+    /// The variable that one output is, if it is no more than that.
+    pub fn variable_output(&self, output: usize) -> Option<usize> {
+        let register = *self.outputs.get(output)? as usize;
+        (register < self.variables).then_some(register)
+    }
+
     /// The variables that one output depends on, ascending.
     pub fn output_reads(&self, output: usize) -> Vec<usize> {
         let Some(&register) = self.outputs.get(output) else { return Vec::new() };
@@ -326,9 +345,11 @@ impl Program {
             }
             return;
         }
-        scratch.clear();
-        scratch.extend_from_slice(&variables[..self.variables]);
-        scratch.resize(self.registers, T::constant(0.0));
+        if scratch.len() < self.registers {
+            scratch.resize(self.registers, T::constant(0.0));
+        }
+        // What earlier evaluations have left in the other registers is overwritten before it is read.
+        scratch[..self.variables].copy_from_slice(&variables[..self.variables]);
         for &instruction in &self.code {
             let (to, value) = match instruction {
                 Instruction::Const(to, x) => (to, T::constant(x)),
@@ -375,63 +396,106 @@ impl Program {
         registers: &mut Vec<Lanes>,
         rows: usize,
     ) -> impl ExactSizeIterator<Item = usize> + '_ {
-        let parts = rows.div_ceil(PART);
         if registers.len() < self.registers {
             registers.resize(self.registers, [0.0; LANES]);
         }
-        for &instruction in &self.code {
-            match instruction {
-                Instruction::Const(to, x) => each(registers, parts, [to, to, to], |_, _| x),
-                Instruction::Unary(Unary::Neg, to, a) => each(registers, parts, [to, a, a], |x, _| -x),
-                Instruction::Unary(Unary::Square, to, a) => each(registers, parts, [to, a, a], |x, _| x * x),
-                Instruction::Unary(op, to, a) => each(registers, parts, [to, a, a], |x, _| f64::unary(op, x)),
-                // The choice of the operation is made once, not for every row.
-                Instruction::Binary(op, to, a, b) => match op {
-                    Binary::Add => each(registers, parts, [to, a, b], |x, y| x + y),
-                    Binary::Sub => each(registers, parts, [to, a, b], |x, y| x - y),
-                    Binary::Mul => each(registers, parts, [to, a, b], |x, y| x * y),
-                    Binary::Div => each(registers, parts, [to, a, b], |x, y| x / y),
-                    _ => each(registers, parts, [to, a, b], |x, y| f64::binary(op, x, y)),
-                },
-                Instruction::Left(op, to, x, b) => match op {
-                    Binary::Add => each(registers, parts, [to, b, b], |y, _| x + y),
-                    Binary::Sub => each(registers, parts, [to, b, b], |y, _| x - y),
-                    Binary::Mul => each(registers, parts, [to, b, b], |y, _| x * y),
-                    Binary::Div => each(registers, parts, [to, b, b], |y, _| x / y),
-                    _ => each(registers, parts, [to, b, b], |y, _| f64::binary(op, x, y)),
-                },
-                Instruction::Right(op, to, a, y) => match op {
-                    Binary::Add => each(registers, parts, [to, a, a], |x, _| x + y),
-                    Binary::Sub => each(registers, parts, [to, a, a], |x, _| x - y),
-                    Binary::Mul => each(registers, parts, [to, a, a], |x, _| x * y),
-                    Binary::Div => each(registers, parts, [to, a, a], |x, _| x / y),
-                    _ => each(registers, parts, [to, a, a], |x, _| f64::binary(op, x, y)),
-                },
-                Instruction::Select(to, c, a, b) => {
-                    let (c, a, b) = (registers[c as usize], registers[a as usize], registers[b as usize]);
-                    registers[to as usize] = std::array::from_fn(|i| f64::select(c[i], a[i], b[i]));
-                }
-                Instruction::Curve(curve, part, to, a) => {
-                    let curve = &self.curves[curve as usize];
-                    each(registers, parts, [to, a, a], |x, _| curve.eval(part, x));
-                }
-                Instruction::Piece(curve, part, to, i, a) => {
-                    let curve = &self.curves[curve as usize];
-                    each(registers, parts, [to, i, a], |i, x| curve.continued(part, i, x));
-                }
-                Instruction::Element(array, to, i) => {
-                    let array = &self.arrays[array as usize];
-                    each(registers, parts, [to, i, i], |i, _| array.element(i));
-                }
-                Instruction::Field(field, part, to, at) => {
-                    let (field, at) = (&self.fields[field as usize], at.map(|of| registers[of as usize]));
-                    let value = |i: usize| field.value(part, [at[0][i], at[1][i], at[2][i], at[3][i]]);
-                    registers[to as usize] =
-                        std::array::from_fn(|i| if i < rows { value(i) } else { f64::NAN });
-                }
-            }
+        // Loops of a length that is known when this is compiled take two thirds of the instructions.
+        match rows.div_ceil(PART) {
+            0 | 1 => self.run::<1>(registers, rows),
+            2 => self.run::<2>(registers, rows),
+            _ => self.run::<{ LANES / PART }>(registers, rows),
         }
         self.outputs.iter().map(|&register| register as usize)
+    }
+
+    /// Carries out all instructions for so many parts of the lanes, of which `rows` lanes count.
+    fn run<const PARTS: usize>(&self, registers: &mut [Lanes], rows: usize) {
+        for instruction in &self.code {
+            match *instruction {
+                Instruction::Const(to, x) => each::<PARTS>(registers, [to, to, to], |_, _| x),
+                Instruction::Unary(Unary::Neg, to, a) => each::<PARTS>(registers, [to, a, a], |x, _| -x),
+                Instruction::Unary(Unary::Square, to, a) => {
+                    each::<PARTS>(registers, [to, a, a], |x, _| x * x)
+                }
+                Instruction::Binary(Binary::Add, to, a, b) => {
+                    each::<PARTS>(registers, [to, a, b], |x, y| x + y)
+                }
+                Instruction::Binary(Binary::Sub, to, a, b) => {
+                    each::<PARTS>(registers, [to, a, b], |x, y| x - y)
+                }
+                Instruction::Binary(Binary::Mul, to, a, b) => {
+                    each::<PARTS>(registers, [to, a, b], |x, y| x * y)
+                }
+                Instruction::Binary(Binary::Div, to, a, b) => {
+                    each::<PARTS>(registers, [to, a, b], |x, y| x / y)
+                }
+                Instruction::Left(Binary::Add, to, x, b) => {
+                    each::<PARTS>(registers, [to, b, b], |y, _| x + y)
+                }
+                Instruction::Left(Binary::Sub, to, x, b) => {
+                    each::<PARTS>(registers, [to, b, b], |y, _| x - y)
+                }
+                Instruction::Left(Binary::Mul, to, x, b) => {
+                    each::<PARTS>(registers, [to, b, b], |y, _| x * y)
+                }
+                Instruction::Left(Binary::Div, to, x, b) => {
+                    each::<PARTS>(registers, [to, b, b], |y, _| x / y)
+                }
+                Instruction::Right(Binary::Add, to, a, y) => {
+                    each::<PARTS>(registers, [to, a, a], |x, _| x + y)
+                }
+                Instruction::Right(Binary::Sub, to, a, y) => {
+                    each::<PARTS>(registers, [to, a, a], |x, _| x - y)
+                }
+                Instruction::Right(Binary::Mul, to, a, y) => {
+                    each::<PARTS>(registers, [to, a, a], |x, _| x * y)
+                }
+                Instruction::Right(Binary::Div, to, a, y) => {
+                    each::<PARTS>(registers, [to, a, a], |x, _| x / y)
+                }
+                _ => self.carry_out(*instruction, registers, rows),
+            }
+        }
+    }
+
+    /// Carries out an instruction that is more than arithmetic, row by row.
+    fn carry_out(&self, instruction: Instruction, registers: &mut [Lanes], rows: usize) {
+        match instruction {
+            Instruction::Const(to, x) => each_of(registers, rows, [to, to, to], &mut |_, _| x),
+            Instruction::Unary(op, to, a) => {
+                each_of(registers, rows, [to, a, a], &mut |x, _| f64::unary(op, x))
+            }
+            Instruction::Binary(op, to, a, b) => {
+                each_of(registers, rows, [to, a, b], &mut |x, y| f64::binary(op, x, y));
+            }
+            Instruction::Left(op, to, x, b) => {
+                each_of(registers, rows, [to, b, b], &mut |y, _| f64::binary(op, x, y));
+            }
+            Instruction::Right(op, to, a, y) => {
+                each_of(registers, rows, [to, a, a], &mut |x, _| f64::binary(op, x, y));
+            }
+            Instruction::Select(to, c, a, b) => {
+                let (c, a, b) = (registers[c as usize], registers[a as usize], registers[b as usize]);
+                registers[to as usize] = std::array::from_fn(|i| f64::select(c[i], a[i], b[i]));
+            }
+            Instruction::Curve(curve, part, to, a) => {
+                let curve = &self.curves[curve as usize];
+                each_of(registers, rows, [to, a, a], &mut |x, _| curve.eval(part, x));
+            }
+            Instruction::Piece(curve, part, to, i, a) => {
+                let curve = &self.curves[curve as usize];
+                each_of(registers, rows, [to, i, a], &mut |i, x| curve.continued(part, i, x));
+            }
+            Instruction::Element(array, to, i) => {
+                let array = &self.arrays[array as usize];
+                each_of(registers, rows, [to, i, i], &mut |i, _| array.element(i));
+            }
+            Instruction::Field(field, part, to, at) => {
+                let (field, at) = (&self.fields[field as usize], at.map(|of| registers[of as usize]));
+                let value = |i: usize| field.value(part, [at[0][i], at[1][i], at[2][i], at[3][i]]);
+                registers[to as usize] = std::array::from_fn(|i| if i < rows { value(i) } else { f64::NAN });
+            }
+        }
     }
 
     /// Evaluates a program of one root; convenient where speed does not matter.

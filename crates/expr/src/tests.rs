@@ -36,6 +36,28 @@ fn all() -> (Graph, Vec<(String, NodeId)>) {
     (g, list)
 }
 
+/// Many rows at once give each row the bits that it has alone, however many there are.
+#[test]
+fn rows_are_what_each_is_alone() {
+    let (graph, list) = all();
+    let at = |row: usize| [0.1 + 0.37 * row as f64 - 3.0, 2.5 - 0.21 * row as f64];
+    for (name, node) in list {
+        let program = Program::compile(&graph, &[node], 2);
+        for rows in [1, 7, 8, 9, 16, 17, LANES] {
+            let mut registers = vec![[f64::NAN; LANES]; 2];
+            for row in 0..rows {
+                [registers[0][row], registers[1][row]] = at(row);
+            }
+            let output = program.eval_rows(&mut registers, rows).next().expect("one root");
+            for row in 0..rows {
+                let (together, alone) = (registers[output][row], program.eval_one(&at(row)));
+                let same = together.to_bits() == alone.to_bits() || together.is_nan() && alone.is_nan();
+                assert!(same, "{name}, row {row} of {rows}: {together}, not {alone}");
+            }
+        }
+    }
+}
+
 fn eval<T: Value>(graph: &Graph, node: NodeId, variables: &[T]) -> T {
     let mut out = [T::constant(0.0)];
     Program::compile(graph, &[node], 2).eval(variables, &mut Vec::new(), &mut out);

@@ -12,6 +12,8 @@ pub struct Stepping {
     formulas_read: Vec<bool>,
     /// True if rates, or values that are solved for, read `t`.
     timed: bool,
+    /// True if steps may read `age`.
+    aged: bool,
 }
 
 /// A variable of a rule that is a parameter.
@@ -27,14 +29,14 @@ pub struct Read {
 
 impl Stepping {
     /// The results of an analysis: the components with formulas and without, the parameters that a step reads, by variable
-    /// whether formulas read it, and whether rates or values that are solved for read `t`.
+    /// whether formulas read it, and whether rates or values that are solved for read `t`, and steps `age`.
     pub fn new(
         components: [Vec<usize>; 2],
         reads: Vec<Read>,
         formulas_read: Vec<bool>,
-        timed: bool,
+        [timed, aged]: [bool; 2],
     ) -> Stepping {
-        Stepping { components, reads, formulas_read, timed }
+        Stepping { components, reads, formulas_read, timed, aged }
     }
 
     /// The parameters that are integrated, then those that are solved for, in the order of their components. `numeric_only`
@@ -51,6 +53,11 @@ impl Stepping {
     /// True if rates, or values that are solved for, read the time of the simulation.
     pub fn is_timed(&self) -> bool {
         self.timed
+    }
+
+    /// True if a step may read the age of the module.
+    pub fn is_aged(&self) -> bool {
+        self.aged
     }
 
     /// By variable of the rule: true if a formula reads it when the clause becomes active.

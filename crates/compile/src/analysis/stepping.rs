@@ -89,7 +89,7 @@ impl StepEquations<'_> {
         formulas_read.iter_mut().take(layout.own).for_each(|own| *own = true);
         let time = layout.variables - 2;
         let timed = [self.rates, &algebraic.values].iter().any(|program| program.reads().contains(&time));
-        Stepping::new(components, reads, formulas_read, timed)
+        Stepping::new(components, reads, formulas_read, [timed, read[time + 1]])
     }
 }
 

@@ -11,8 +11,9 @@ use super::dop853::join_estimates;
 use crate::Rates;
 use crate::dense::Dense;
 use crate::one_step::{InteriorError, Nodes, OneStep, Step, Trial};
-use crate::workspace::{FLOOR, PART, Workspace, part};
+use crate::workspace::{FLOOR, MAX_STAGES, PART, Workspace, part};
 use dlsys_expr::SimTime;
+use smallvec::SmallVec;
 use std::marker::PhantomData;
 
 /// An explicit Runge-Kutta pair with dense output, for `y' = f(t, y)` and steps of length `h`.
@@ -156,16 +157,29 @@ impl<P: Pair> OneStep for Explicit<P> {
 /// So few components are summed one by one, in the same order as many.
 const FEW: usize = 2;
 
-/// The sums of the stages' rates with these weights, of the components from `first` on.
-#[inline]
-fn weigh(weights: &[f64], k: &[Vec<f64>], first: usize) -> [f64; PART] {
+/// So many parts are summed without a list of the stages that count, which takes about as long to make.
+const SHORT: usize = 8;
+
+/// A stage that counts in a sum: its weight, and its rates in parts.
+type Term<'k> = (f64, &'k [[f64; PART]]);
+
+/// All stages that count in a sum.
+type Listed<'k> = SmallVec<[Term<'k>; MAX_STAGES]>;
+
+/// The stages that count in a sum with these weights.
+#[inline(always)]
+fn terms<'k>(weights: &[f64], k: &'k [Vec<f64>]) -> impl Iterator<Item = Term<'k>> {
+    let counts = |(weight, _): &(&f64, &Vec<f64>)| **weight != 0.0;
+    weights.iter().zip(k).filter(counts).map(|(weight, k)| (*weight, k.as_chunks().0))
+}
+
+/// The sums of the stages' rates, of the components of a part.
+#[inline(always)]
+fn weigh<'k>(terms: impl Iterator<Item = Term<'k>>, block: usize) -> [f64; PART] {
     let mut sums = [0.0; PART];
-    for (weight, k) in weights.iter().zip(k) {
-        if *weight != 0.0 {
-            let k: &[f64; PART] = part(k, first);
-            for (sum, k) in sums.iter_mut().zip(k) {
-                *sum += weight * k;
-            }
+    for (weight, k) in terms {
+        for (sum, k) in sums.iter_mut().zip(&k[block]) {
+            *sum += weight * k;
         }
     }
     sums
@@ -222,8 +236,12 @@ impl Workspace {
             return;
         }
         let (from, stage) = (from.as_chunks::<PART>().0, stage.as_chunks_mut::<PART>().0);
+        let listed: Listed = if from.len() > SHORT { terms(weights, k).collect() } else { Listed::new() };
         for (block, (from, stage)) in from.iter().zip(stage).enumerate() {
-            let sums = weigh(weights, k, block * PART);
+            let sums = match listed.is_empty() {
+                true => weigh(terms(weights, k), block),
+                false => weigh(listed.iter().copied(), block),
+            };
             for i in 0..PART {
                 stage[i] = from[i] + h * sums[i];
             }
@@ -243,17 +261,25 @@ impl Workspace {
     fn error(&mut self, tableau: &Tableau, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
         let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
         let blur = 4.0 * self.resolution / tableau.c[1];
-        let estimates = |row: &[f64], first: usize| match n {
-            0..=FEW => std::array::from_fn(|j| if j < n { weighed(row, &self.k, j) } else { 0.0 }),
-            _ => weigh(row, &self.k, first),
+        let mut listed: [Listed; 2] = Default::default();
+        if n > SHORT * PART {
+            listed.iter_mut().zip(tableau.e).for_each(|(list, row)| list.extend(terms(row, &self.k)));
+        }
+        let estimates = |number: usize, block: usize| {
+            let (row, list) = (tableau.e[number], &listed[number]);
+            match n {
+                0..=FEW => std::array::from_fn(|j| if j < n { weighed(row, &self.k, j) } else { 0.0 }),
+                _ if list.is_empty() => weigh(terms(row, &self.k), block),
+                _ => weigh(list.iter().copied(), block),
+            }
         };
         // The last stage is the end of the step.
         let (from, end) = (self.from.as_chunks::<PART>().0, self.stage.as_chunks::<PART>().0);
         for (block, (from, end)) in from.iter().zip(end).enumerate() {
             let first = block * PART;
-            let mut estimate = estimates(tableau.e[0], first);
-            if let Some(low) = tableau.e.get(1) {
-                for (high, low) in estimate.iter_mut().zip(estimates(low, first)) {
+            let mut estimate = estimates(0, block);
+            if tableau.e.len() > 1 {
+                for (high, low) in estimate.iter_mut().zip(estimates(1, block)) {
                     *high = join_estimates(h * *high, h * low);
                 }
             } else {

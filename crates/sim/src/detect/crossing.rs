@@ -6,10 +6,11 @@
 //! unless the bounds over the whole path already exclude a change of sign.
 
 use crate::detect::signs::{Reach, opposite, rate_at, reach, sign_of};
+use crate::world::coupled_solution::DenseComponent;
 use crate::world::path::Path;
 use crate::world::state::State;
 use dlsys_expr::{Binary, Dual, Interval, Program, Scratch, Value};
-use dlsys_model::{Condition, Rule, Sign, ZeroCrossing};
+use dlsys_model::{AffineSum, Condition, Rule, Sign, ZeroCrossing};
 use dlsys_ode::{Function, Root, first_root};
 use dlsys_tree::SimTime;
 
@@ -93,6 +94,46 @@ impl Function for Difference<'_, '_> {
     }
 }
 
+/// The difference of an atom whose sides are an integrated parameter of the module and a number: the same bits as those of
+/// [`Difference`], without all that the rule's other variables take.
+struct LevelDifference<'p> {
+    along: DenseComponent<'p>,
+    level: f64,
+    /// The parameter is the left side.
+    is_left: bool,
+    stretch: f64,
+}
+
+impl<'p> LevelDifference<'p> {
+    fn new(path: &'p Path, atom: usize) -> Option<LevelDifference<'p>> {
+        let sides = &path.rule.sides;
+        let [left, right] = [0, 1].map(|side| sides.variable_output(2 * atom + side));
+        let (variable, is_left) = (left.or(right)?, left.is_some());
+        let level = sides.constant_output(2 * atom + usize::from(is_left))?;
+        let stretch = path.world.stretch / path.h;
+        Some(LevelDifference { along: path.dense_component(variable)?, level, is_left, stretch })
+    }
+
+    fn of<T: Value>(&self, x: T) -> T {
+        let level = T::constant(self.level);
+        if self.is_left { T::binary(Binary::Sub, x, level) } else { T::binary(Binary::Sub, level, x) }
+    }
+}
+
+impl Function for LevelDifference<'_> {
+    fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
+        self.of(self.along.over(lo, hi))
+    }
+
+    fn value(&mut self, at: f64) -> f64 {
+        self.of(self.along.value(at))
+    }
+
+    fn stretch(&self) -> f64 {
+        self.stretch
+    }
+}
+
 /// True if the crossings of some atom of a module can only be found by search, so that the stretch to search must be
 /// bounded.
 pub fn needs_search(state: &State, rule: &Rule) -> bool {
@@ -140,14 +181,21 @@ impl CrossingDetector {
         sign: Sign,
         error: f64,
     ) -> bool {
-        let ZeroCrossing::Formula { variable, level } = crossing else { return false };
         if !matches!(sign, Sign::Plus | Sign::Minus) {
             return false;
         }
-        let Some(bounds) = path.dense_bounds(*variable) else { return false };
-        let level = self.level(path, level);
+        // The side on which the sum has the sign that the difference has; a formula does not tell.
+        let (variable, level, side) = match crossing {
+            ZeroCrossing::Formula { variable, level } => (*variable, self.level(path, level), 0.0),
+            ZeroCrossing::Search(Some(AffineSum { constant, terms })) if terms.len() == 1 => {
+                let (variable, factor) = terms[0];
+                (variable, -constant / factor, sign_of(sign) * factor)
+            }
+            _ => return false,
+        };
+        let Some(bounds) = path.dense_bounds(variable) else { return false };
         let margin = error.max(1e-9) * (level.abs() + bounds.magnitude());
-        level < bounds.lo - margin || level > bounds.hi + margin
+        (side >= 0.0 && level < bounds.lo - margin) || (side <= 0.0 && level > bounds.hi + margin)
     }
 
     /// The value of the variable at which the sides of an atom meet.
@@ -193,8 +241,11 @@ impl CrossingDetector {
                 tolerance = tolerance.max(noise).max(self.rounding(path, atom, from));
             }
         }
-        let Root { position, at, after } =
-            first_root(&mut self.difference(path, atom), from, limit, sign, tolerance)?;
+        let root = match LevelDifference::new(path, atom) {
+            Some(mut plain) => first_root(&mut plain, from, limit, sign, tolerance),
+            None => first_root(&mut self.difference(path, atom), from, limit, sign, tolerance),
+        };
+        let Root { position, at, after } = root?;
         let time = path.start.after(position * path.h);
         let passes = at == Sign::Zero && after == opposite(sign);
         let level = if passes { self.level_of(path, atom) } else { None };

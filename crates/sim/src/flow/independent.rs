@@ -9,7 +9,7 @@ use crate::trajectory::Trajectory;
 use crate::world::state::{Control, State, Step};
 use crate::world::{World, describe};
 use dlsys_expr::{Program, Scratch};
-use dlsys_model::{Jacobian, Rule};
+use dlsys_model::{Rule, Solve};
 use dlsys_ode::{Dense, Rates};
 use dlsys_tree::{ModuleId, SimTime};
 use smallvec::SmallVec;
@@ -32,10 +32,8 @@ pub fn crawls(mark: &mut SimTime, since_mark: &mut usize, at: SimTime) -> bool {
 
 /// The equations of one module that is integrated alone.
 struct Independent<'a> {
+    solve: &'a Solve,
     program: &'a Program,
-    jacobian: &'a Jacobian,
-    /// Row, column and entry in the clause's Jacobian.
-    partials: SmallVec<[(u32, u32, usize); 4]>,
     /// All variables of the rule; those that move are filled in for each evaluation.
     variables: Vec<f64>,
     /// The index of each component among the variables.
@@ -64,8 +62,16 @@ impl<'a> Independent<'a> {
     ) -> Independent<'a> {
         y.clear();
         let own = world.tree.parameters(state.id);
-        world.variables(rule, state.id, &state.context, from, &mut variables);
-        variables[..own.len()].copy_from_slice(own);
+        if rule.aggregates.is_empty() {
+            // Those that move, and the times, are filled in for each evaluation.
+            variables.clear();
+            variables.extend_from_slice(own);
+            state.context.context().iter().for_each(|module| world.values(*module, from, &mut variables));
+            variables.resize(rule.variables, 0.0);
+        } else {
+            world.variables(rule, state.id, &state.context, from, &mut variables);
+            variables[..own.len()].copy_from_slice(own);
+        }
         let (t, age) = (from.to_f64(), from.since(world.tree.birth(state.id)));
         variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
         let solve = &rule.solves[state.solve.expect("numeric trajectories have equations")];
@@ -84,30 +90,19 @@ impl<'a> Independent<'a> {
             }
         }
         let (offset, time) = (from.since(state.since), rule.time_variable());
-        let component = |variable: usize| numeric.iter().position(|v| *v == variable).map(|c| c as u32);
-        let partials = (solve.jacobian.entries.iter().enumerate())
-            .filter_map(|(entry, &(row, variable))| {
-                Some((component(solve.of[row])?, component(variable)?, entry))
-            })
-            .collect();
-        let jacobian = &solve.jacobian;
-        Independent {
-            program,
-            jacobian,
-            partials,
-            variables,
-            numeric,
-            formulas,
-            offset,
-            time,
-            t,
-            age,
-            scratch,
-        }
+        Independent { solve, program, variables, numeric, formulas, offset, time, t, age, scratch }
     }
 }
 
 impl Independent<'_> {
+    /// The partial derivatives of the rates by the components: row, column and entry in the clause's Jacobian.
+    fn entries(&self) -> impl Iterator<Item = (u32, u32, usize)> {
+        let component = |variable: usize| self.numeric.iter().position(|v| *v == variable).map(|c| c as u32);
+        self.solve.jacobian.entries.iter().enumerate().filter_map(move |(entry, &(row, variable))| {
+            Some((component(self.solve.of[row])?, component(variable)?, entry))
+        })
+    }
+
     /// Fills in the variables that move, at a time since the start of the step.
     fn move_to(&mut self, tau: f64, y: &[f64]) {
         for (&variable, &value) in self.numeric.iter().zip(y) {
@@ -131,15 +126,16 @@ impl Rates for Independent<'_> {
     }
 
     fn couplings(&self) -> Vec<(u32, u32)> {
-        self.partials.iter().map(|&(row, column, _)| (row, column)).collect()
+        self.entries().map(|(row, column, _)| (row, column)).collect()
     }
 
     fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>) {
         self.move_to(tau, y);
-        let mut all: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; self.jacobian.values.outputs()];
-        self.jacobian.values.eval(&self.variables, &mut self.scratch, &mut all);
+        let values = &self.solve.jacobian.values;
+        let mut all: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; values.outputs()];
+        values.eval(&self.variables, &mut self.scratch, &mut all);
         out.clear();
-        out.extend(self.partials.iter().map(|&(.., entry)| all[entry]));
+        out.extend(self.entries().map(|(.., entry)| all[entry]));
     }
 
     fn modules(&self) -> u64 {
@@ -175,7 +171,8 @@ impl FlowStage<'_, '_> {
         let solve = state.solve.expect("has equations");
         let hint = self.flows.hints[self.world.tree.kind(id).index()][solve];
         let last = state.step.as_ref();
-        let mut control = last.filter(|s| s.live).map_or(hint, |s| s.control);
+        let own = last.filter(|s| s.live || s.solve == solve);
+        let mut control = own.map_or(hint, |s| s.control);
         // The experience of other modules tells nothing about the error of this one's values.
         control.error = last.map_or(0.0, |s| s.control.error);
         let dense = self.make_own_step(id, from, &mut control).map_err(|error| {
@@ -195,11 +192,17 @@ impl FlowStage<'_, '_> {
                 if !step.live {
                     (step.mark, step.since_mark) = (from, 0);
                 }
+                if step.solve != solve {
+                    (step.solve, step.begun, step.first) = (solve, from, control.size);
+                }
                 (step.dense, step.control, step.live) = (dense, control, true);
                 crawls(&mut step.mark, &mut step.since_mark, from)
             }
             step => {
-                *step = Some(Box::new(Step { dense, control, live: true, mark: from, since_mark: 0 }));
+                let (mark, since_mark, first) = (from, 0, control.size);
+                let step_made =
+                    Step { dense, control, solve, begun: from, first, live: true, mark, since_mark };
+                *step = Some(Box::new(step_made));
                 false
             }
         };
@@ -253,8 +256,20 @@ impl FlowStage<'_, '_> {
             }
             let (world, tolerance) = (&*self.world, self.setup.settings.tolerance);
             let (nodes, start, end, own) = (&*integrator.nodes(), from, dense.end, Some(dense));
-            let examined =
-                ExaminedStep { world, state, rule, solve, start, end, nodes, own, tolerance, stiff };
+            let at_start = (nodes.first() == Some(&0.0)).then(|| integrator.rates_at_start());
+            let examined = ExaminedStep {
+                world,
+                state,
+                rule,
+                solve,
+                start,
+                end,
+                nodes,
+                own,
+                at_start,
+                tolerance,
+                stiff,
+            };
             match overlooked(self.detector, &examined, index, tries) {
                 Some(at) if dense.h > least => {
                     stats.rejected += 1;
@@ -269,18 +284,18 @@ impl FlowStage<'_, '_> {
         step
     }
 
-    /// Adapts the step size with which the next module under these equations begins, after an event inside a module's
-    /// own step.
+    /// Adapts the step size with which a module goes on after an event inside its own step, and that with which the next module
+    /// under these equations begins: as this one should have begun, for lives that follow each other begin alike.
     pub fn learn(&mut self, id: ModuleId) {
-        let now = self.instant.at;
-        let Some(state) = self.world.state(id) else { return };
-        let (Some(solve), Some(step)) = (state.solve, &state.step) else { return };
-        let kind = self.world.tree.kind(id).index();
+        let (now, kind) = (self.instant.at, self.world.tree.kind(id).index());
+        let Some(state) = self.world.state_mut(id) else { return };
+        let (Some(solve), Some(step)) = (state.solve, &mut state.step) else { return };
         if step.live {
-            let mut control = step.control;
-            let (lived, error) = (now.since(step.dense.start), control.last_error);
-            control.foresee(error, lived, now.resolution());
-            self.flows.hints[kind][solve] = Control { last_error: 1.0, ..control };
+            let control = &mut step.control;
+            control.foresee(control.last_error, now.since(step.dense.start), now.resolution());
+            control.last_error = 1.0;
+            let size = if step.dense.start == step.begun { control.size } else { step.first };
+            self.flows.hints[kind][solve] = Control { size, ..*control };
         }
     }
 

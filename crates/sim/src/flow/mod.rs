@@ -284,7 +284,7 @@ impl FlowStage<'_, '_> {
     fn rebase(&mut self, id: ModuleId, at: SimTime) {
         let state = self.world.state(id).expect("scheduled");
         let first = self.world.tree.places(id).start;
-        let ends: Vec<(usize, f64)> = (state.trajectories.iter().enumerate())
+        let ends: SmallVec<[(usize, f64); 4]> = (state.trajectories.iter().enumerate())
             .filter_map(|(parameter, trajectory)| match trajectory {
                 Trajectory::Step(c) => {
                     let dense: &Dense = &state.step.as_ref()?.dense;

@@ -95,9 +95,11 @@ impl World {
 
     /// Gives a module an empty state.
     pub fn new_state(&mut self, id: ModuleId) -> &mut State {
-        let state = self.make_state(id);
-        *state = State::new(id);
-        state
+        match self.states.get_mut(id.slot()) {
+            Some(Some(state)) => **state = State::new(id),
+            _ => return self.make_state(id),
+        }
+        self.make_state(id)
     }
 
     /// True for a module that is alive and lazy.

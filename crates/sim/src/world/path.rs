@@ -21,7 +21,6 @@ pub struct Path<'p> {
     pub rule: &'p Rule,
     pub start: SimTime,
     pub h: f64,
-    age: f64,
     /// Which variables are wanted; all where this is empty.
     wanted: &'p [bool],
     /// The module's own step, if it is not stored in its state yet.
@@ -30,8 +29,12 @@ pub struct Path<'p> {
 
 impl<'p> Path<'p> {
     pub fn new(world: &'p World, state: &'p State, rule: &'p Rule, start: SimTime, h: f64) -> Path<'p> {
-        let age = start.since(world.tree.birth(state.id));
-        Path { world, state, rule, start, h, age, wanted: &rule.watched, step: None }
+        Path { world, state, rule, start, h, wanted: &rule.watched, step: None }
+    }
+
+    /// The age of the module at the start. Births stand elsewhere in memory.
+    fn age(&self) -> f64 {
+        self.start.since(self.world.tree.birth(self.state.id))
     }
 
     /// The path of all variables that equations read; along a step of the module's own, if that is given.
@@ -58,10 +61,14 @@ impl<'p> Path<'p> {
         }
     }
 
+    /// The dense output that an own parameter follows, if it is integrated.
+    pub fn dense_component(&self, parameter: usize) -> Option<DenseComponent<'_>> {
+        self.piece(self.state, self.state.trajectories.get(parameter)?)
+    }
+
     /// Bounds of an own parameter over the whole stretch, if it follows dense output.
     pub fn dense_bounds(&self, parameter: usize) -> Option<Interval> {
-        let trajectory = self.state.trajectories.get(parameter)?;
-        Some(self.piece(self.state, trajectory)?.bounds())
+        Some(self.dense_component(parameter)?.bounds())
     }
 
     /// Gives each variable that is wanted to one of three functions: values that rest, pieces of dense output, and formulas
@@ -79,7 +86,8 @@ impl<'p> Path<'p> {
         for &id in std::iter::once(&self.state.id).chain(self.state.context.context()) {
             self.append(id, wanted, out, &rest, &piece, &formula);
         }
-        let times = [time(self.start.to_f64()), time(self.age)];
+        let age = wanted(self.rule.variables - 1) || !self.rule.aggregates.is_empty();
+        let times = [time(self.start.to_f64()), time(if age { self.age() } else { 0.0 })];
         if self.rule.aggregates.is_empty() {
             out.resize(self.rule.variables - 2, T::constant(0.0));
             out.extend(times);

@@ -56,6 +56,11 @@ pub struct State {
 pub struct Step {
     pub dense: Dense,
     pub control: Control,
+    /// The clause whose equations the module follows, since when it has followed them, and the length that its first step then should
+    /// have had.
+    pub solve: usize,
+    pub begun: SimTime,
+    pub first: f64,
     /// The step is of the present trajectory.
     pub live: bool,
     /// Time in the past, and the number of steps since then.

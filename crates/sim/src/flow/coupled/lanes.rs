@@ -17,7 +17,8 @@ pub struct LaneBatches {
     columns: Vec<(u32, LaneColumn)>,
     numbers: Vec<f64>,
     places: Vec<u32>,
-    sources: Vec<VariableSource>,
+    /// Lanes of mixed columns that read neither a component nor an input, with their sources.
+    others: Vec<(u32, VariableSource)>,
 }
 
 /// Rows that are evaluated at once: at most [`LANES`], with the same program.
@@ -45,7 +46,8 @@ enum LaneColumn {
     Known(usize),
     /// Aggregates, by their numbers.
     RowAggregate(usize),
-    Mixed(usize),
+    /// Mostly components and inputs, from the first number on; the lanes between the others read something else.
+    Mixed(usize, usize, usize),
 }
 
 /// Places in a vector; mostly consecutive, because rows stand in string order.
@@ -77,7 +79,7 @@ impl LaneBatches {
         self.columns.clear();
         self.numbers.clear();
         self.places.clear();
-        self.sources.clear();
+        self.others.clear();
         let key = |row: &EquationRow| (row.rule, row.solve, row.numeric_only);
         let mut keys: SmallVec<[_; 4]> = SmallVec::new();
         for row in table.rows.iter().filter(|row| row.rates > 0) {
@@ -162,10 +164,10 @@ impl LaneBatches {
 
     /// The sources of a variable that is neither a component nor an input in some row.
     fn other_column(&mut self, table: &EquationTable, range: Range<usize>, variable: usize) -> LaneColumn {
-        let LaneBatches { rows, numbers, places, sources, .. } = self;
+        let LaneBatches { rows, numbers, places, others, .. } = self;
         let all = rows[range].iter().map(|row| &table.rows[*row as usize]);
         let all = all.map(|row| table.sources[row.first_source + variable]);
-        let (number, place, mixed) = (numbers.len(), places.len(), sources.len());
+        let (number, place, mixed) = (numbers.len(), places.len(), others.len());
         let fixed = |source| match source {
             VariableSource::Fixed(x) => Some(x),
             _ => None,
@@ -182,8 +184,18 @@ impl LaneBatches {
             places.extend(all.filter_map(sum));
             return LaneColumn::RowAggregate(place);
         }
-        sources.extend(all);
-        LaneColumn::Mixed(mixed)
+        let components = table.places.len() as u32;
+        for (lane, source) in all.enumerate() {
+            places.push(match source {
+                VariableSource::State(component) => component,
+                VariableSource::Input(input) => components + input,
+                other => {
+                    others.push((lane as u32, other));
+                    0
+                }
+            });
+        }
+        LaneColumn::Mixed(place, mixed, others.len())
     }
 
     /// Evaluates the rates of all rows, and writes them to their components in `out`.
@@ -248,9 +260,11 @@ impl LaneBatches {
             LaneColumn::State(LanePlaces::Any(first)) => pick(point.y, first, to),
             LaneColumn::Known(first) => pick(point.known, first, to),
             LaneColumn::RowAggregate(first) => pick(point.aggregates, first, to),
-            LaneColumn::Mixed(first) => {
-                for (lane, source) in to.iter_mut().zip(&self.sources[first..]) {
-                    *lane = table.value(*source, tau, point.y, point.inputs);
+            LaneColumn::Mixed(first, from, end) => {
+                // There are no known inputs if the table has none.
+                pick(if point.known.is_empty() { point.y } else { point.known }, first, to);
+                for (lane, source) in &self.others[from..end] {
+                    to[*lane as usize] = table.value(*source, tau, point.y, point.inputs);
                 }
             }
         }

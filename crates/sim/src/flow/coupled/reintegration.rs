@@ -353,6 +353,7 @@ impl FlowStage<'_, '_> {
         let frozen = self.setup.settings.is_sliced();
         let (world, members, start) = (&*self.world, &region.members, now);
         system.rebuild(rules, &Membership { world, members, start, frozen }, number);
+        system.prepare_rates(rules);
         for &component in &*components {
             numbers[component as usize] = NOT_HERE;
         }

@@ -133,7 +133,10 @@ impl FlowStage<'_, '_> {
         let is_unwatched =
             rules.iter().all(|rule| rule.atoms.is_empty()) && pulsing.is_empty() && system.algebra.is_empty();
         integrator.set_unwatched(is_unwatched);
-        integrator.restart(self.setup.settings.method, y.len());
+        if linear.is_none() {
+            system.prepare_rates(rules);
+            integrator.restart(self.setup.settings.method, y.len());
+        }
     }
 
     /// True if some condition of the coupled modules can only be found by searching their common trajectory.
@@ -188,12 +191,14 @@ impl FlowStage<'_, '_> {
             may_spare = false;
             self.flows.coupled.control.size = SHORTER * end.since(from);
         };
-        let members = std::mem::take(&mut self.flows.coupled.members);
-        for (at, &id) in members.iter().enumerate() {
-            prefetch(self.world, &members, at);
-            self.search_member(id, from);
+        if !self.flows.coupled.integrator.is_unwatched() {
+            let members = std::mem::take(&mut self.flows.coupled.members);
+            for (at, &id) in members.iter().enumerate() {
+                prefetch(self.world, &members, at);
+                self.search_member(id, from);
+            }
+            self.flows.coupled.members = members;
         }
-        self.flows.coupled.members = members;
         self.schedule.schedule(Owner::Coupled, end);
         Ok(())
     }
@@ -352,9 +357,12 @@ impl FlowStage<'_, '_> {
             return self.restart_coupled(at);
         }
         let Coupled { members, system, y, integrator, control, .. } = &mut self.flows.coupled;
-        for (n, id) in members.iter().enumerate() {
-            prefetch(self.world, members, n);
-            self.world.state_mut(*id).expect("a member").pass_changes(at);
+        // Without conditions there are no signs that change.
+        if !integrator.is_unwatched() {
+            for (n, id) in members.iter().enumerate() {
+                prefetch(self.world, members, n);
+                self.world.state_mut(*id).expect("a member").pass_changes(at);
+            }
         }
         integrator.advance(y);
         for (&(place, ..), &value) in system.table.places.iter().zip(y.iter()) {
@@ -436,5 +444,6 @@ fn examined_step<'p>(
     let state = world.state(id)?;
     let rule = &rules[state.rule?];
     let (solve, end) = (&rule.solves[state.solve?], world.coupled.as_ref()?.end);
-    Some(ExaminedStep { world, state, rule, solve, start, end, nodes, own: None, tolerance, stiff })
+    let (own, at_start) = (None, None);
+    Some(ExaminedStep { world, state, rule, solve, start, end, nodes, own, at_start, tolerance, stiff })
 }

@@ -45,12 +45,13 @@ impl System {
     pub fn new(table: EquationTable, rules: &[Rule]) -> System {
         let mut system = System { table, ..System::default() };
         system.finish(rules);
+        system.prepare_rates(rules);
         system
     }
 
     /// Makes these the equations of some of the coupled modules, in the memory of the equations before. `unknown` gives
     /// the number here of a component of the coupled solution, in the order of the members; None if it is not
-    /// integrated here.
+    /// integrated here. Rates can be evaluated after [`System::prepare_rates`].
     pub fn rebuild(&mut self, rules: &[Rule], modules: &Membership, unknown: impl Fn(u32) -> Option<u32>) {
         self.table.clear(modules.start);
         for (at, &id) in modules.members.iter().enumerate() {
@@ -67,6 +68,10 @@ impl System {
     fn finish(&mut self, rules: &[Rule]) {
         self.algebra = Algebra::new(&self.table, rules);
         self.table.batch_terms(&mut self.terms);
+    }
+
+    /// Puts the rates into batches. Equations that are solved without steps need none.
+    pub fn prepare_rates(&mut self, rules: &[Rule]) {
         self.lanes.fill(&self.table, rules);
     }
 
@@ -133,7 +138,8 @@ impl EquationTable {
         let integrated = rates(clause, state.numeric_only);
         let first_switch = self.switches.len();
         self.switches.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
-        let birth = world.tree.birth(id);
+        // Births stand elsewhere in memory.
+        let birth = if clause.stepping.is_aged() { world.tree.birth(id) } else { self.start };
         self.rows.push(EquationRow {
             rule,
             solve,

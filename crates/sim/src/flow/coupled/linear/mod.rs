@@ -78,7 +78,10 @@ pub struct Linear {
     series: Option<Series>,
     /// A series whose values bound the sizes of all terms of `series`.
     majorant: Option<Box<Series>>,
-    poles: Option<Poles>,
+    /// None as long as they have not been needed; None inside if there are none.
+    poles: Option<Option<Poles>>,
+    /// The largest coefficient.
+    fastest: f64,
     steps: Option<Box<LinearSteps>>,
 }
 
@@ -90,8 +93,9 @@ impl Linear {
             return None;
         }
         let orthant = Orthant::new(&problem)?;
-        let poles = Poles::new(&problem);
-        Some(Linear { problem, unknown, start, orthant, series: None, majorant: None, poles, steps: None })
+        let fastest = problem.entries.iter().fold(0.0f64, |m, e| m.max(e.2.abs()));
+        let (series, majorant, poles, steps) = Default::default();
+        Some(Linear { problem, unknown, start, orthant, series, majorant, poles, fastest, steps })
     }
 
     /// The components at an instant, as the dense output of a step of length 0. NaN where the solution exceeds the
@@ -112,14 +116,16 @@ impl Linear {
 
     /// The state some time after the start, by the first method without steps whose error is within its bound.
     fn without_steps(&mut self, tau: f64) -> Option<Vec<f64>> {
-        let pays_above = match &self.poles {
-            Some(poles) if poles.are_proven() => POLES_COST,
-            Some(_) => UNPROVEN_POLES_COST,
-            None => f64::INFINITY,
+        let poles_first = !self.takes_few_products(tau) && {
+            let pays_above = match self.poles() {
+                Some(poles) if poles.are_proven() => POLES_COST,
+                Some(_) => UNPROVEN_POLES_COST,
+                None => f64::INFINITY,
+            };
+            // This test does not need the series.
+            let surely = self.poles().is_some_and(|poles| poles.spare(pays_above, tau));
+            surely || self.products(tau) > pays_above
         };
-        // This test does not need the series.
-        let surely = self.poles.as_ref().is_some_and(|poles| poles.spare(pays_above, tau));
-        let poles_first = surely || self.products(tau) > pays_above;
         if poles_first && let Some(y) = self.by_poles(tau) {
             return Some(y);
         }
@@ -140,8 +146,20 @@ impl Linear {
         self.series().products(tau)
     }
 
+    /// True if the series takes so few products up to a time that the rational approximation need not be looked at.
+    fn takes_few_products(&mut self, tau: f64) -> bool {
+        // At least as many as the largest coefficient makes: often this decides, without the series.
+        self.fastest * tau <= POLES_COST && self.products(tau) <= POLES_COST
+    }
+
+    /// The rational approximation, if there is one.
+    fn poles(&mut self) -> Option<&mut Poles> {
+        self.poles.get_or_insert_with(|| Poles::new(&self.problem)).as_mut()
+    }
+
     fn by_poles(&mut self, tau: f64) -> Option<Vec<f64>> {
-        self.poles.as_mut()?.at(&self.problem, tau)
+        self.poles();
+        self.poles.as_mut()?.as_mut()?.at(&self.problem, tau)
     }
 
     fn by_series(&mut self, tau: f64) -> Option<Vec<f64>> {

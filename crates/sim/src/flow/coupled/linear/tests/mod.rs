@@ -139,7 +139,7 @@ fn answers(weighing: Weighing, wanted: [usize; 3]) {
     for seed in 0..1_000 {
         let (problem, tau) = random(&mut Random(seed), weighing);
         let Some(mut linear) = linear(&problem) else { continue };
-        let proven = linear.poles.as_ref().is_some_and(Poles::are_proven);
+        let proven = linear.poles().is_some_and(|poles| poles.are_proven());
         let affordable = linear.products(tau) <= MOST_PRODUCTS;
         let series = if affordable { linear.by_series(tau) } else { None };
         let poles = linear.by_poles(tau);
