@@ -147,7 +147,8 @@ fn ground_alone_is_seen_as_it_is() {
 #[test]
 fn errors_of_ground_are_measured_by_the_width_of_columns_and_by_ticks() {
     let text = CONE.replace("cell 0.01", "cell 0.02");
-    let study = dlsys::study::soil_study(&session(&text), &[0.5, 1.0], Settings::default(), 60.0, &mut |_| ());
+    let study =
+        dlsys::study::soil_study(&session(&text), &[0.5, 1.0], Settings::default(), 60.0, &mut |_| ());
     let study = study.expect("runs").expect("ground of soil");
     for points in [&study.by_cell, &study.by_tick] {
         let outcomes: Vec<_> = points.iter().map(|point| point.result.clone().expect("a run")).collect();
