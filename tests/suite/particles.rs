@@ -51,6 +51,49 @@ fn drawn(session: &Session, time: f64) -> Scene {
     scene
 }
 
+/// The words of what sticks: a value that makes no sense, or nothing to do, is told with its place.
+#[test]
+fn what_holds_is_declared_with_its_acceleration() {
+    let text = |soil: &str| BALL.replace("shed 0.1", soil);
+    let message = |text: &str| match Session::from_text("ground.dls", text, &[]) {
+        Ok(session) => session.warnings.iter().map(|warning| warning.message.clone()).collect::<String>(),
+        Err(error) => error.to_string(),
+    };
+    for (soil, expected) in [
+        ("hold 0", "error: this is no acceleration\n --> ground.dls:1:36"),
+        ("hold 20, exponent -1", "error: this is no exponent\n --> ground.dls:1:49"),
+        ("exponent 2", "`exponent` stands here without `hold`"),
+    ] {
+        let found = message(&text(soil));
+        assert!(found.contains(expected), "{soil}: {found}");
+    }
+    let idle = text("hold 20").replace("stick 0.003, ", "");
+    assert_eq!(message(&idle), "`hold` does nothing here");
+    assert_eq!(message(&text("shed 0.1, hold 20, exponent 2")), "");
+}
+
+/// A body that is moved without a jerk keeps what sticks to it, and it is drawn there: in pictures and OBJ, and in files whose points move.
+#[test]
+fn what_sticks_is_drawn_on_the_body() {
+    // It is lifted at 0.5 m/s, as it went down.
+    let text = BALL.replace("shed 0.1", "shed 0.1, hold 1000").replace("2.5 - 9.81*(t - 0.4)", "0.5");
+    let session = session(&text.replace("dx/dt = 0.4", "dx/dt = 0"));
+    let terrain = terrain(&session, 1);
+    let time = 0.9;
+    let report = terrain.report(time, None).unwrap();
+    assert!(report.sticking > 1e-5 && report.imbalance == 0, "{report:?}");
+    // The ball is 25 cm above the ground there: what is drawn around it is what sticks.
+    let near = |points: &[Point]| points.iter().filter(|point| (0.1..0.2).contains(&point.y)).count();
+    let all = vertices(&terrain, time);
+    let count = near(&all[..all.len() - 6 * report.particles]);
+    assert!(count > 100, "{count}");
+    let quilt = terrain.quilt(time, MaterialId::LEAF, None).unwrap();
+    let mut scene = Nursery::new(&session.model, Settings::default()).blank();
+    terrain.draw_quilt(time, &quilt, None, &mut scene).unwrap();
+    let meshes = scene.surfaces.iter().filter(|surface| !quilt.is_particle(surface));
+    assert_eq!(meshes.map(|surface| near(&surface.mesh.vertices)).sum::<usize>(), count);
+}
+
 /// Times in any order, on and between ticks, one or two threads: the same bits; and no quantum is lost.
 #[test]
 fn particles_depend_neither_on_the_order_of_times_nor_on_threads() {

@@ -129,6 +129,43 @@ fn pictures_and_files_have_the_ground() {
     assert!(obj.contains("\ng ground\nusemtl ground\n"));
 }
 
+/// Where the model draws nothing, its ground has light and shadow all the same: a heap is seen from above.
+#[test]
+fn ground_alone_is_seen_as_it_is() {
+    let text = CONE.replace("F(0.01)", "A") + "camera at 0, 1, 0.01 towards 0, 0, 0 angle 40\n";
+    let session = session(&text);
+    let picture = |time: f64| {
+        let scene = drawn(&session, time);
+        let mut survey = Survey::new(View::FRONT);
+        survey.add(&scene);
+        FrameWriter::new(Format::PNG, survey.fit()).write(&scene, "heap")
+    };
+    assert_ne!(picture(0.0), picture(1.0));
+}
+
+/// The report on a scene with soil: errors that fall with the width of columns, and no volume from nowhere.
+#[test]
+fn errors_of_ground_are_measured_by_the_width_of_columns_and_by_ticks() {
+    let text = CONE.replace("cell 0.01", "cell 0.02");
+    let study =
+        dlsys::study::soil_study(&session(&text), &[0.5, 1.0], Settings::default(), 60.0, &mut |_| ());
+    let study = study.expect("runs").expect("ground of soil");
+    for points in [&study.by_cell, &study.by_tick] {
+        let outcomes: Vec<_> = points.iter().map(|point| point.result.clone().expect("a run")).collect();
+        assert_eq!((outcomes.len(), outcomes[3].misplaced, outcomes[3].height), (4, 0.0, 0.0));
+        assert!(outcomes[0].misplaced > 0.0 && outcomes.iter().all(|outcome| outcome.imbalance == 0));
+    }
+    let [coarse, _, fine, _] = [0, 1, 2, 3].map(|n| study.by_cell[n].result.clone().expect("a run"));
+    assert!(fine.misplaced < 0.5 * coarse.misplaced, "{coarse:?} {fine:?}");
+    assert!(fine.updates > 4 * coarse.updates);
+    let table = dlsys::study::soil_table(&study);
+    assert!(table.contains("misplaced") && table.contains("the reference"), "{table}");
+    // Rules that read the ground would grow otherwise on other columns.
+    let reads = CONE.replace("F(0.01)", "A(0)") + "A(y): solve dy/dt = ground(0, 0)\n";
+    let none = dlsys::study::soil_study(&session(&reads), &[0.5], Settings::default(), 60.0, &mut |_| ());
+    assert!(none.expect("nothing to run").is_none());
+}
+
 /// The pieces of ground that a file shows, against the ground itself at a tick: the largest distance of a point of one from the other, beside the ball.
 fn apart(terrain: &Terrain, shown: &[Shown], time: f64) -> f64 {
     let cell = 0.01;

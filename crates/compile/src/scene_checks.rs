@@ -219,10 +219,12 @@ pub fn plants_as_bodies(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
 /// Warns of soil that is to be shed and does not stick, of gas that ground of soil does not stop, and of shelves without a ground whose material they could carry.
 pub fn soil(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
     let scenery = &model.scenery;
-    let idle =
-        |soil: &&Soil| soil.stick.unwrap_or(0.0) == 0.0 && (soil.shed.is_some() || soil.grain.is_some());
-    for soil in scenery.soils.iter().filter(idle) {
-        let word = if soil.shed.is_some() { "shed" } else { "grain" };
+    let named = |soil: &Soil| {
+        let all = [("shed", soil.shed), ("hold", soil.hold), ("grain", soil.grain)];
+        all.into_iter().find(|(_, value)| value.is_some()).map(|(word, _)| word)
+    };
+    let idle = scenery.soils.iter().filter(|soil| soil.stick.unwrap_or(0.0) == 0.0);
+    for (soil, word) in idle.filter_map(|soil| named(soil).map(|word| (soil, word))) {
         diagnostics.push(
             Diagnostic::warning(format!("`{word}` does nothing here"))
                 .at(soil.span, "nothing of this soil sticks to bodies")

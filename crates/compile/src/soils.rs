@@ -92,6 +92,22 @@ const SHED: Quantity = Quantity {
         "it is greater than 0 and at most 1e6: after `shed 0.1` seconds a part 1/e still sticks to a body that has left the ground",
     )
 };
+const HOLD: Quantity = Quantity {
+    most: 1e6,
+    ..positive(
+        "acceleration",
+        " m/s²",
+        "a body sheds all that is due where it is accelerated by as much or more, and less where it is accelerated less: greater than 0 and at most 1e6, as `hold 30`",
+    )
+};
+const EXPONENT: Quantity = Quantity {
+    most: 100.0,
+    ..positive(
+        "exponent",
+        "",
+        "what is shed goes with this power of the acceleration, greater than 0 and at most 100: 1 without it, and more for soil that lets go all at once",
+    )
+};
 const GRAIN: Quantity = Quantity {
     most: 1000.0,
     ..positive(
@@ -126,9 +142,9 @@ impl Builder<'_> {
             ("snow", SoilBase::Snow),
             ("soil", SoilBase::Soil),
         ];
-        const WORDS: [&str; 12] = [
+        const WORDS: [&str; 14] = [
             "repose", "inner", "push", "rough", "flow", "cohesion", "weight", "bearing", "swell", "stick",
-            "shed", "grain",
+            "shed", "hold", "exponent", "grain",
         ];
         if let Some(before) = self.scenery.soils.iter().find(|soil| soil.name == name.text) {
             let twice = Diagnostic::error(format!("the soil `{}` is declared twice", name.text))
@@ -159,8 +175,29 @@ impl Builder<'_> {
                     .help("keep one of them, and add values that differ: `soil wet = sand, repose 45`"),
             );
         }
-        let [repose, inner, push, rough, flow, cohesion, weight, bearing, swell, stick, shed, grain] =
-            self.sorted(attributes, WORDS);
+        let [
+            repose,
+            inner,
+            push,
+            rough,
+            flow,
+            cohesion,
+            weight,
+            bearing,
+            swell,
+            stick,
+            shed,
+            hold,
+            exponent,
+            grain,
+        ] = self.sorted(attributes, WORDS);
+        if let Some(exponent) = exponent.filter(|_| hold.is_none()) {
+            self.scope.diagnostics.push(
+                Diagnostic::error("`exponent` stands here without `hold`")
+                    .at(exponent.span, "it is the power of an acceleration relative to `hold`")
+                    .help("add that acceleration in m/s², `hold 30`, or remove `exponent`"),
+            );
+        }
         if let [first, second, ..] = colors {
             self.scope.diagnostics.push(advice::given_twice("`color`", [first.span, second.span]));
         }
@@ -193,6 +230,8 @@ impl Builder<'_> {
             swell: self.attribute(swell, &SWELL),
             stick: self.attribute(stick, &STICK),
             shed: self.attribute(shed, &SHED),
+            hold: self.attribute(hold, &HOLD),
+            exponent: self.attribute(exponent, &EXPONENT),
             grain: self.attribute(grain, &GRAIN),
             color: colors.first().and_then(|text| color(text, self.scope)).unwrap_or(base.color()),
             span,

@@ -34,7 +34,7 @@ impl Ground {
         for body in bodies {
             self.move_body(body, 0.0)?;
         }
-        self.land(span)?;
+        self.land(bodies, span)?;
         for pour in pours {
             self.pour(pour, tick)?;
         }

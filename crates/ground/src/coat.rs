@@ -6,9 +6,11 @@
 //! place of that interval which is random. So births have random times, and what has been shed differs from the exponential by less than a
 //! particle of each patch at all times. Triangles that are larger than a column are divided, so that what sticks does not depend on how a body is divided into triangles.
 
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::barrier::Barriers;
 use crate::noise::{mixed, unit};
 use crate::particles::Particle;
 use crate::tile::{HIGHEST, QUANTA};
@@ -29,11 +31,12 @@ const SKIN: i64 = 4096;
 /// What sticks to a body.
 #[derive(Clone, Debug)]
 pub(crate) struct Coats {
-    triangles: Arc<[[u32; 3]]>,
+    pub triangles: Arc<[[u32; 3]]>,
     /// Into how many parts the sides of each triangle are divided, and the number of its first patch.
     divisions: Arc<[(u32, u32)]>,
-    /// Where the points of the body are.
-    points: Arc<[Vector]>,
+    /// Where the points of the body are, and where they were at the tick before.
+    pub points: Arc<[Vector]>,
+    past: Arc<[Vector]>,
     /// By patch.
     coats: BTreeMap<u32, Coat>,
 }
@@ -52,6 +55,8 @@ struct Coat {
 struct Shedding {
     /// When the patch left the ground.
     since: f64,
+    /// For how long it has shed since then, as if it had been shaken all the time ([`Soil::hold`](crate::Soil::hold)).
+    shaken: f64,
     /// Volume of each particle in quanta; the last one is what is left.
     size: i64,
     /// Number of particles, and of those that have left.
@@ -71,10 +76,10 @@ impl Shedding {
         unit(mixed(self.id() ^ mixed(number)))
     }
 
-    /// When the next particle leaves.
+    /// How long after the patch has left the ground the next particle leaves, if that is shaken.
     fn next(&self, constant: f64) -> f64 {
         let part = (f64::from(self.gone) + self.random(0)) / f64::from(self.count);
-        self.since - constant * libm::log(1.0 - part)
+        -constant * libm::log(1.0 - part)
     }
 
     /// Weights of the corners of a triangle for a place that is random on it, each as likely as any (equations 5 to 7).
@@ -116,7 +121,8 @@ impl Coats {
         Coats {
             triangles: Arc::clone(&body.triangles),
             divisions: numbered.collect(),
-            points: Arc::clone(&body.to),
+            points: Arc::clone(&body.from),
+            past: Arc::clone(&body.from),
             coats: BTreeMap::new(),
         }
     }
@@ -132,6 +138,24 @@ impl Coats {
             row += 1;
         }
         (self.triangles[number], part(count, row, place))
+    }
+
+    /// The corners of patches to which something sticks, and its volume in quanta.
+    pub fn patches(&self) -> impl Iterator<Item = ([Vector; 3], i64)> + '_ {
+        self.coats.iter().map(|(patch, coat)| {
+            let (corners, weights) = self.patch(*patch);
+            let corners = corners.map(|n| self.points[n as usize]);
+            (weights.map(|weights| mean(weights, corners)), coat.volume)
+        })
+    }
+
+    /// The acceleration of the middle of a patch, from the tick before to this one, in which the body goes on from where it was.
+    fn acceleration(&self, body: &Body, (corners, weights): ([u32; 3], [[f64; 3]; 3]), tick: f64) -> f64 {
+        let change = corners.map(|n| {
+            let n = n as usize;
+            (body.to[n] - body.from[n]) - (self.points[n] - self.past[n])
+        });
+        mean([1.0 / 3.0; 3], weights.map(|weights| mean(weights, change))).norm() / (tick * tick)
     }
 
     fn volume(&self) -> i128 {
@@ -180,6 +204,9 @@ impl Ground {
         if self.soil().stick == 0.0 {
             return Ok(());
         }
+        let (tick, cell) = (self.setup.settings.tick, self.cell());
+        let made = OnceCell::new();
+        let barriers = || made.get_or_init(|| Barriers::new(bodies, true, span[1], (tick, cell)));
         for body in bodies.iter().filter(|body| !body.shelf) {
             let known = self.coats.get(&body.id).cloned();
             let same = known
@@ -188,7 +215,9 @@ impl Ground {
             let mut coats = match same {
                 Some(coats) => coats,
                 None => {
-                    self.let_go(body.id, span)?;
+                    if self.coats.contains_key(&body.id) {
+                        self.let_go(body.id, span, barriers())?;
+                    }
                     Arc::new(Coats::new(body, self.cell()))
                 }
             };
@@ -196,7 +225,11 @@ impl Ground {
                 self.touch(body, span, Arc::make_mut(&mut coats))?;
             }
             if coats.coats.values().any(|coat| coat.shedding.is_some()) {
-                self.shed(body, span, Arc::make_mut(&mut coats))?;
+                self.shed(body, span, Arc::make_mut(&mut coats), barriers())?;
+            }
+            if coats.points != body.to || coats.past != body.from {
+                let coats = Arc::make_mut(&mut coats);
+                (coats.past, coats.points) = (Arc::clone(&body.from), Arc::clone(&body.to));
             }
             Arc::make_mut(&mut self.coats).insert(body.id, coats);
         }
@@ -204,7 +237,12 @@ impl Ground {
     }
 
     /// Lets go all that sticks to a body that is gone, or has another shape now. It is at rest where it was.
-    pub(crate) fn let_go(&mut self, id: u64, [begin, end]: [f64; 2]) -> Result<(), Error> {
+    pub(crate) fn let_go(
+        &mut self,
+        id: u64,
+        [begin, end]: [f64; 2],
+        barriers: &Barriers,
+    ) -> Result<(), Error> {
         if !self.coats.contains_key(&id) {
             return Ok(());
         }
@@ -217,7 +255,7 @@ impl Ground {
             while let Some((volume, left)) = rest.next() {
                 let place = mean(left.weights(), weights.map(|weights| mean(weights, corners)));
                 let (id, velocity) = (left.id(), Vector::zeros());
-                self.throw(Particle { id, born: begin, place, velocity, volume }, end)?;
+                self.throw(Particle { id, born: begin, place, velocity, volume }, end, barriers)?;
             }
         }
         Ok(())
@@ -225,7 +263,6 @@ impl Ground {
 
     /// Patches that touch the ground after a tick take it up; those that have left it begin to shed.
     fn touch(&mut self, body: &Body, [begin, end]: [f64; 2], coats: &mut Coats) -> Result<(), Error> {
-        coats.points = Arc::clone(&body.to);
         let clear = self.soil().stick + NEAR * self.cell();
         let touches = self.touches(body, coats, clear);
         for Touch { patch, column, most } in &touches {
@@ -327,7 +364,8 @@ impl Ground {
         let size = std::f64::consts::PI / 6.0 * (self.grain() / self.cell()).powi(3) * QUANTA;
         let count = (coat.volume as f64 / size).round().clamp(1.0, 1e6).min(coat.volume as f64);
         let seed = mixed(body ^ mixed(u64::from(patch) ^ mixed(self.book.ticks)));
-        Shedding { since, size: coat.volume / count as i64, count: count as u32, gone: 0, seed }
+        let (size, count) = (coat.volume / count as i64, count as u32);
+        Shedding { since, shaken: 0.0, size, count, gone: 0, seed }
     }
 
     /// Diameter of particles in m.
@@ -338,27 +376,49 @@ impl Ground {
     }
 
     /// Throws the particles that leave a body in a tick.
-    fn shed(&mut self, body: &Body, [begin, end]: [f64; 2], coats: &mut Coats) -> Result<(), Error> {
-        let constant = self.soil().shed;
+    fn shed(
+        &mut self,
+        body: &Body,
+        [begin, end]: [f64; 2],
+        coats: &mut Coats,
+        barriers: &Barriers,
+    ) -> Result<(), Error> {
+        let (soil, tick) = (*self.soil(), end - begin);
         let patches: Vec<u32> = coats.coats.keys().copied().collect();
+        // Not if it was not there at the tick before, or is somewhere else now.
+        let is_followed = soil.hold.is_some() && *coats.points == *body.from;
         for patch in patches {
             let (corners, weights) = coats.patch(patch);
+            let acceleration =
+                if is_followed { coats.acceleration(body, (corners, weights), tick) } else { 0.0 };
             let Some(coat) = coats.coats.get_mut(&patch) else { continue };
-            while let Some(born) =
-                coat.shedding.map(|shedding| shedding.next(constant)).filter(|at| *at <= end)
-            {
+            let Some(Shedding { since, shaken, .. }) = coat.shedding else { continue };
+            let (from, pace) = (since.max(begin), soil.part_let_go(acceleration));
+            while let Some(next) = coat.shedding.map(|shedding| shedding.next(soil.shed)) {
+                let born = match soil.hold {
+                    None => since + next,
+                    // Of what would leave the part `pace` does: time counts less.
+                    Some(_) if next <= shaken + pace * (end - from) => from + (next - shaken) / pace,
+                    Some(_) => break,
+                };
+                if born > end {
+                    break;
+                }
                 let Some((volume, shedding)) = coat.next() else { break };
-                let part = ((born - begin) / (end - begin)).clamp(0.0, 1.0);
+                let part = ((born - begin) / tick).clamp(0.0, 1.0);
                 let inside = shedding.weights();
                 let at = |points: &[Vector]| {
                     let corners = corners.map(|n| points[n as usize]);
                     mean(inside, weights.map(|weights| mean(weights, corners)))
                 };
                 let (from, to) = (at(&body.from), at(&body.to));
-                let velocity = (to - from) / (end - begin);
+                let velocity = (to - from) / tick;
                 let velocity = velocity + shedding.scatter() * (SCATTER * velocity.norm());
                 let (id, place) = (shedding.id(), from + (to - from) * part);
-                self.throw(Particle { id, born, place, velocity, volume }, end)?;
+                self.throw(Particle { id, born, place, velocity, volume }, end, barriers)?;
+            }
+            if let Some(shedding) = &mut coat.shedding {
+                shedding.shaken += pace * (end - from);
             }
         }
         coats.coats.retain(|_, coat| coat.volume > 0);

@@ -1,9 +1,12 @@
 //! What bodies cover: their undersides as ceilings over columns.
 
+use std::cmp::Ordering;
 use std::sync::Arc;
 
-use crate::press::AROUND;
+use crate::marks::Marks;
+use crate::reader::Reader;
 use crate::spans::Place;
+use crate::tile::Key;
 use crate::{Error, Ground};
 
 /// What a body covers: the lowest underside over each column, in quanta.
@@ -25,12 +28,6 @@ impl Foot {
     pub fn comes_below(&self, height: i64) -> bool {
         self.places.iter().any(|place| place.y < height)
     }
-
-    /// The underside over a column.
-    fn over(&self, (i, k): (i32, i32)) -> Option<i64> {
-        let at = self.undersides.binary_search_by_key(&(k, i), |((i, k), _)| (*k, *i)).ok()?;
-        Some(self.undersides[at].1)
-    }
 }
 
 /// The box around columns.
@@ -46,58 +43,97 @@ fn meet(a: Option<[[i32; 2]; 2]>, b: Option<[[i32; 2]; 2]>) -> bool {
     a.zip(b).is_some_and(|(a, b)| along(a[0], b[0]) && along(a[1], b[1]))
 }
 
-/// The columns of two lists, in order, each with the lower underside.
-fn merged(a: &[((i32, i32), i64)], b: &[((i32, i32), i64)]) -> Vec<((i32, i32), i64)> {
-    let mut all: Vec<_> = a.iter().chain(b).copied().collect();
-    all.sort_unstable_by_key(|((i, k), underside)| (*k, *i, *underside));
-    all.dedup_by_key(|(column, _)| *column);
+/// Undersides over columns, in order along z first.
+type Undersides = [((i32, i32), i64)];
+
+/// The columns of two lists, each once with the lower underside.
+fn merged(mut a: &Undersides, mut b: &Undersides) -> Vec<((i32, i32), i64)> {
+    let mut all = Vec::with_capacity(a.len() + b.len());
+    let place = |(i, k): (i32, i32)| (k, i);
+    while let ([first, rest_a @ ..], [other, rest_b @ ..]) = (a, b) {
+        match place(first.0).cmp(&place(other.0)) {
+            Ordering::Less => {
+                all.push(*first);
+                a = rest_a;
+            }
+            Ordering::Greater => {
+                all.push(*other);
+                b = rest_b;
+            }
+            Ordering::Equal => {
+                all.push((first.0, first.1.min(other.1)));
+                (a, b) = (rest_a, rest_b);
+            }
+        }
+    }
+    all.extend_from_slice(a);
+    all.extend_from_slice(b);
     all
+}
+
+/// Lowers heights over columns to the undersides that are over these. Both are in order.
+fn lower_to(roofs: &mut Undersides, undersides: &Undersides) {
+    let mut rest = undersides;
+    for ((i, k), roof) in roofs {
+        let skipped = rest.iter().take_while(|((other, row), _)| (row, other) < (&*k, &*i)).count();
+        rest = &rest[skipped..];
+        if let Some((column, underside)) = rest.first()
+            && *column == (*i, *k)
+        {
+            *roof = (*roof).min(*underside);
+        }
+    }
 }
 
 impl Ground {
     /// Puts a body's new undersides in the place of the old ones, and wakes the columns that this concerns.
     pub(crate) fn cover(&mut self, id: u64, before: Option<&Foot>, after: Option<Foot>) -> Result<(), Error> {
-        let under = |foot: Option<&Foot>| foot.map_or(Vec::new(), |foot| foot.undersides.clone());
-        let lowest = merged(&under(before), &under(after.as_ref()));
+        let none = Foot::default();
+        let [old, new] = [before, after.as_ref()].map(|foot| &*foot.unwrap_or(&none).undersides);
+        let lowest = merged(old, new);
         let feet = Arc::make_mut(&mut self.feet);
         match after {
             Some(foot) => feet.insert(id, Arc::new(foot)),
             None => feet.remove(&id),
         };
         let reach = reach_of(&lowest);
-        let near: Vec<_> = self.feet.values().filter(|foot| meet(foot.reach, reach)).cloned().collect();
-        let roofs = lowest.iter().map(|&(column, _)| {
-            let all = near.iter().filter_map(|foot| foot.over(column));
-            (column, all.min().unwrap_or(i64::MAX))
-        });
-        let roofs: Vec<_> = roofs.collect();
+        let mut roofs: Vec<_> = lowest.iter().map(|(column, _)| (*column, i64::MAX)).collect();
+        for foot in self.feet.values().filter(|foot| meet(foot.reach, reach)) {
+            lower_to(&mut roofs, &foot.undersides);
+        }
         self.set_roofs(&roofs);
         // Columns under a body that touches them, or did, and those around it.
-        let touched = lowest.into_iter().filter(|((i, k), underside)| {
-            self.extent().contains(*i, *k) && underside - (1 << 32) <= self.top(*i, *k)
-        });
-        let around = touched
-            .flat_map(|((i, k), _)| std::iter::once((i, k)).chain(AROUND.map(|(di, dk)| (i + di, k + dk))));
-        let around = around.collect();
-        self.wake_all(around)
+        let (mut marks, mut reader, extent) = (Marks::new(self.setup.side), Reader::new(self), self.extent());
+        for (column, underside) in lowest {
+            if extent.contains(column.0, column.1) && underside - (1 << 32) <= reader.top(column) {
+                marks.add_around(column);
+            }
+        }
+        self.wake_marked(marks)
     }
 
     /// Sets the ceilings over columns; tiles without any are not stored.
-    fn set_roofs(&mut self, roofs: &[((i32, i32), i64)]) {
+    fn set_roofs(&mut self, roofs: &Undersides) {
         self.graph = None;
         let (extent, count) = (self.extent(), self.setup.settings.side * self.setup.settings.side);
         let inside = roofs.iter().filter(|((i, k), _)| extent.contains(*i, *k));
-        let mut places: Vec<_> = inside.map(|((i, k), roof)| (self.setup.place(*i, *k), *roof)).collect();
-        places.sort_unstable();
+        let places: Vec<_> = inside.map(|((i, k), roof)| (self.setup.place(*i, *k), *roof)).collect();
         let stored = Arc::make_mut(&mut self.roofs);
-        for tile in places.chunk_by(|a, b| a.0.0 == b.0.0) {
-            let key = tile[0].0.0;
-            let all = stored.entry(key).or_insert_with(|| vec![i64::MAX; count].into());
-            let all = Arc::make_mut(all);
-            for ((_, index), roof) in tile {
+        let mut opened: Vec<Key> = Vec::new();
+        for row in places.chunk_by(|a, b| a.0.0 == b.0.0) {
+            let key = row[0].0.0;
+            let all = Arc::make_mut(stored.entry(key).or_insert_with(|| vec![i64::MAX; count].into()));
+            for ((_, index), roof) in row {
                 all[*index] = *roof;
             }
-            if all.iter().all(|roof| *roof == i64::MAX) {
+            if row.iter().any(|(_, roof)| *roof == i64::MAX) {
+                opened.push(key);
+            }
+        }
+        opened.sort_unstable();
+        opened.dedup();
+        for key in opened {
+            if stored.get(&key).is_some_and(|all| all.iter().all(|roof| *roof == i64::MAX)) {
                 stored.remove(&key);
             }
         }

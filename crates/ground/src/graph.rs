@@ -114,6 +114,15 @@ impl Graph {
         rise.clamp(-most, most)
     }
 
+    /// Whether something that can slip stands beside a floor and higher than it: down onto a bare floor, nothing else does.
+    fn is_below_loads(&self, floor: usize, top: i64, (load, film): (&[i64], i64)) -> bool {
+        let all = &self.near[self.starts[4 * floor] as usize..self.starts[4 * floor + 4] as usize];
+        all.iter().any(|node| {
+            let node = *node as usize;
+            load[node] > film && self.base[node] + load[node] > top
+        })
+    }
+
     /// Fluxes of the four triangles at each floor.
     fn fluxes(&self, law: &Law, load: &[i64]) -> Vec<Flux> {
         let film = law.film as i64;
@@ -121,7 +130,12 @@ impl Graph {
         let mut fluxes = Vec::new();
         for (floor, node) in (self.indices.len()..self.base.len()).enumerate() {
             let top = self.base[node] + load[node];
-            let (mut e, mut others) = ([0.0; 4], [node; 4]);
+            if load[node] <= film && !self.is_below_loads(floor, top, (load, film)) {
+                continue;
+            }
+            let (mut e, mut others) = ([0.0_f64; 4], [node; 4]);
+            // The largest squares along x and along z.
+            let (mut along, mut across) = (0.0_f64, 0.0_f64);
             for side in 0..4 {
                 let Some(other) = self.beside(4 * floor + side, top) else { continue };
                 let rise = self.base[other] + load[other] - top;
@@ -135,7 +149,14 @@ impl Graph {
                     && self.ceiling[lower] - self.base[lower] - load[lower] <= film;
                 if load[upper] > film && !full {
                     (e[side], others[side]) = (to_float(rise), other);
+                    let square = e[side] * e[side];
+                    (along, across) =
+                        if side < 2 { (along.max(square), across) } else { (along, across.max(square)) };
                 }
+            }
+            // None of the four triangles is steeper than these together.
+            if along + across <= most {
+                continue;
             }
             let weight = |x: usize, z: usize| {
                 let square = e[x] * e[x] + e[z] * e[z];

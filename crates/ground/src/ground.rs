@@ -9,6 +9,7 @@ use crate::error::check;
 use crate::graph::Graph;
 use crate::kernel::Law;
 use crate::load::Floors;
+use crate::marks::Marks;
 use crate::material::REST;
 use crate::particles::Particle;
 use crate::rules::Speeds;
@@ -394,25 +395,22 @@ impl Ground {
     }
 
     /// Marks columns as changed; those beyond the edges are left out.
-    pub(crate) fn wake_all(&mut self, columns: Vec<(i32, i32)>) -> Result<(), Error> {
-        let (extent, side) = (self.extent(), self.setup.settings.side);
-        let inside = columns.into_iter().filter(|(i, k)| extent.contains(*i, *k));
-        let mut places: Vec<_> = inside.map(|(i, k)| self.setup.place(i, k)).collect();
-        places.sort_unstable();
-        places.dedup();
+    pub(crate) fn wake_all(&mut self, columns: impl IntoIterator<Item = (i32, i32)>) -> Result<(), Error> {
+        let mut marks = Marks::new(self.setup.side);
+        columns.into_iter().for_each(|column| marks.add(column));
+        self.wake_marked(marks)
+    }
+
+    /// Marks columns as changed; those beyond the edges are left out.
+    pub(crate) fn wake_marked(&mut self, marks: Marks) -> Result<(), Error> {
         let cohesive = self.setup.settings.rule.bonds(self.soil());
-        for tile in places.chunk_by(|a, b| a.0 == b.0) {
-            let key = tile[0].0;
-            let mut bits = vec![0; side];
-            for (_, index) in tile {
-                bits[index / side] |= 1 << (index % side);
-            }
+        for (key, bits) in marks.within(self.extent()) {
             self.ensure(key)?;
             for (row, bits) in self.tile_mut(key)?.awake.iter_mut().zip(&bits) {
                 *row |= bits;
             }
             if cohesive {
-                note(&mut self.strained, key, &bits);
+                note(&mut self.strained, key, &bits[..self.setup.settings.side]);
             }
             if let Err(at) = self.awake.binary_search(&key) {
                 self.awake.insert(at, key);
@@ -421,8 +419,23 @@ impl Ground {
         Ok(())
     }
 
-    /// Marks a column as changed.
+    /// Marks a column as changed, if it is not beyond the edges.
     pub(crate) fn wake(&mut self, i: i32, k: i32) -> Result<(), Error> {
-        self.wake_all(vec![(i, k)])
+        if !self.extent().contains(i, k) {
+            return Ok(());
+        }
+        let (key, index) = self.setup.place(i, k);
+        let side = self.setup.settings.side;
+        self.ensure(key)?;
+        self.tile_mut(key)?.awake[index / side] |= 1 << (index % side);
+        if self.setup.settings.rule.bonds(self.soil()) {
+            let mut bits = vec![0; side];
+            bits[index / side] |= 1 << (index % side);
+            note(&mut self.strained, key, &bits);
+        }
+        if let Err(at) = self.awake.binary_search(&key) {
+            self.awake.insert(at, key);
+        }
+        Ok(())
     }
 }

@@ -6,6 +6,8 @@
 
 use std::ops::Range;
 
+use crate::squares::{squares, varied_squares};
+
 /// Added to and subtracted from a number of less than 2^51, this rounds it to an integer.
 const ROUND: f64 = 6_755_399_441_055_744.0;
 /// The bits of [`ROUND`] as an integer.
@@ -25,12 +27,12 @@ pub(crate) fn to_integer(value: f64) -> i64 {
 
 /// The larger one, where neither is NaN.
 #[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
 #[inline(always)]
-fn smaller(a: f64, b: f64) -> f64 {
+pub(crate) fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
@@ -83,6 +85,8 @@ pub(crate) struct Block {
 pub(crate) struct Traits {
     /// Slopes or ratios differ.
     pub varied: bool,
+    /// No slope of repose is less, in quanta.
+    pub least: f64,
     /// Some columns are bare: the edges down from these are walls.
     pub bare: bool,
     /// Some columns have a ceiling.
@@ -116,9 +120,9 @@ impl Block {
         let (rows, places) = (rows.start - 2..rows.end + 2, places.start - 2..places.end + 2);
         self.differences(law, &rows, &places, traits);
         if traits.varied {
-            self.weights::<true>(law, &rows, &places);
+            self.weights::<true>((law, traits.least), &rows, &places);
         } else {
-            self.weights::<false>(law, &rows, &places);
+            self.weights::<false>((law, law.slope), &rows, &places);
         }
         self.limits(&rows, &places, traits);
     }
@@ -160,7 +164,12 @@ impl Block {
         }
     }
 
-    fn weights<const VARIED: bool>(&mut self, law: &Law, rows: &Range<usize>, places: &Range<usize>) {
+    fn weights<const VARIED: bool>(
+        &mut self,
+        (law, least): (&Law, f64),
+        rows: &Range<usize>,
+        places: &Range<usize>,
+    ) {
         let (w, n) = (self.width, places.len() - 1);
         let start = places.start;
         self.fx[rows.start * w..rows.end * w].fill(0.0);
@@ -174,7 +183,7 @@ impl Block {
             let steep = if VARIED {
                 let slopes = [&self.slope[at..=at + n], &self.slope[at + w..=at + w + n]];
                 let ratios = [&self.ratio[at..=at + n], &self.ratio[at + w..=at + w + n]];
-                varied_squares(law, [b, t, l, s], slopes, ratios, [low, high, left, right])
+                varied_squares((law, least), [b, t, l, s], slopes, ratios, [low, high, left, right])
             } else {
                 squares(law, [b, t, l, s], [low, high, left, right])
             };
@@ -211,12 +220,27 @@ impl Block {
             }
         }
         let inner = (rows.start + 1..rows.end - 1, places.start + 1..places.end - 1);
-        let short = traits.roofed || inner.0.clone().any(|r| self.is_short(r, &inner.1));
-        if short {
-            for r in inner.0.clone() {
+        let exceeds = |r: usize| {
+            let short = self.exceeds(r, &inner.1, &self.loose, 1.0);
+            short || traits.roofed && self.exceeds(r, &inner.1, &self.room, -1.0)
+        };
+        // Bits of rows in which a column would give more than it has, or take more than it can.
+        let limited = inner.0.clone().fold(0_u64, |all, r| all | u64::from(exceeds(r)) << r);
+        if limited == 0 {
+            return;
+        }
+        for r in inner.0.clone() {
+            if limited >> r & 1 != 0 {
                 self.factors(r, &inner.1, traits);
+            } else {
+                let all = r * w + inner.1.start..r * w + inner.1.end;
+                self.give[all.clone()].fill(1.0);
+                self.take[all].fill(1.0);
             }
-            for r in inner.0.clone() {
+        }
+        for r in inner.0.clone() {
+            // The fluxes of a row depend on it and the next one.
+            if limited >> r & 3 != 0 {
                 self.scale(r, &inner.1, r + 1 < inner.0.end, traits);
             }
         }
@@ -228,16 +252,17 @@ impl Block {
         (larger(-east, 0.0) + larger(west, 0.0)) + (larger(-north, 0.0) + larger(south, 0.0))
     }
 
-    /// Whether a column of a row would give more than it has.
-    fn is_short(&self, r: usize, places: &Range<usize>) -> bool {
+    /// Whether a column of a row would give more than there is; or take, with the opposite sign.
+    #[inline(always)]
+    fn exceeds(&self, r: usize, places: &Range<usize>, most: &[f64], sign: f64) -> bool {
         let (at, w, n) = (r * self.width + places.start, self.width, places.len());
         let (east, west) = (&self.fx[at..at + n], &self.fx[at - 1..at - 1 + n]);
         let (north, south) = (&self.fz[at..at + n], &self.fz[at - w..at - w + n]);
-        let loose = &self.loose[at..at + n];
+        let most = &most[at..at + n];
         let mut short = 0;
         for c in 0..n {
-            let out = Self::outflow(east[c], west[c], north[c], south[c]);
-            short |= u64::from(out > larger(loose[c] - SPARE, 0.0));
+            let out = Self::outflow(sign * east[c], sign * west[c], sign * north[c], sign * south[c]);
+            short |= u64::from(out > larger(most[c] - SPARE, 0.0));
         }
         short != 0
     }
@@ -336,93 +361,4 @@ fn close(e: &mut [f64], low: &[f64], high: &[f64], least: f64) {
         let upper = if *e > 0.0 { *high } else { *low };
         *e = if upper > least { *e } else { 0.0 };
     }
-}
-
-/// Weights of a row of squares from the differences along their edges (x at the lower z, x at the higher, z at the lower x, z at the higher). Whether
-/// any is not 0.
-#[inline(always)]
-fn squares(law: &Law, [b, t, l, s]: [&[f64]; 4], [low, high, left, right]: [&mut [f64]; 4]) -> bool {
-    let n = b.len();
-    let (t, l, s) = (&t[..n], &l[..n], &s[..n]);
-    let most = (law.slope * law.rest) * (law.slope * law.rest);
-    let mut steep = 0;
-    for c in 0..n {
-        let (b, t, l, s) = (b[c] * b[c], t[c] * t[c], l[c] * l[c], s[c] * s[c]);
-        steep |= u64::from(larger(b, t) + larger(l, s) > most);
-    }
-    if steep == 0 {
-        return false;
-    }
-    let (low, high) = (&mut low[..n], &mut high[..n]);
-    let (left, right) = (&mut left[..n], &mut right[..n]);
-    let (tau, part) = (law.tau, law.tau * law.slope);
-    for c in 0..n {
-        let (b, t, l, s) = (b[c] * b[c], t[c] * t[c], l[c] * l[c], s[c] * s[c]);
-        let weights = weights([b + l, b + s, t + l, t + s], [most; 4], tau, [part; 4]);
-        let [bl, bs, tl, ts] = weights;
-        low[c] = bl + bs;
-        high[c] = tl + ts;
-        left[c] = bl + tl;
-        right[c] = bs + ts;
-    }
-    true
-}
-
-/// Weights τ - τk/|e| of the four triangles of a square from the squares of |e|, 0 where these are not above the most that stands.
-///
-/// One division serves for four: its results are the products of the others. Pairs of opposite triangles stay pairs in each mirror image of the square, so
-/// the rounding is the same in these.
-#[inline(always)]
-fn weights([bl, bs, tl, ts]: [f64; 4], most: [f64; 4], tau: f64, part: [f64; 4]) -> [f64; 4] {
-    let length = |square: f64, most: f64| larger(square, most).sqrt();
-    let [a, b, c, d] = [length(bl, most[0]), length(bs, most[1]), length(tl, most[2]), length(ts, most[3])];
-    let (p, q) = (a * d, b * c);
-    let inverse = 1.0 / (p * q);
-    let (of_p, of_q) = (q * inverse, p * inverse);
-    let weight = |square: f64, most: f64, part: f64, inverse: f64| {
-        let weight = tau - part * inverse;
-        if square > most { weight } else { 0.0 }
-    };
-    [
-        weight(bl, most[0], part[0], d * of_p),
-        weight(bs, most[1], part[1], c * of_q),
-        weight(tl, most[2], part[2], b * of_q),
-        weight(ts, most[3], part[3], a * of_p),
-    ]
-}
-
-/// As [`squares`], with slopes and ratios of columns. A triangle has the largest slope and the smallest ratio of its columns.
-#[inline(always)]
-fn varied_squares(
-    law: &Law,
-    [b, t, l, s]: [&[f64]; 4],
-    slopes: [&[f64]; 2],
-    ratios: [&[f64]; 2],
-    [low, high, left, right]: [&mut [f64]; 4],
-) -> bool {
-    let n = b.len();
-    let (t, l, s) = (&t[..n], &l[..n], &s[..n]);
-    let [k0, k1] = [&slopes[0][..n + 1], &slopes[1][..n + 1]];
-    let [q0, q1] = [&ratios[0][..n + 1], &ratios[1][..n + 1]];
-    let (low, high) = (&mut low[..n], &mut high[..n]);
-    let (left, right) = (&mut left[..n], &mut right[..n]);
-    let tau = law.tau;
-    let mut steep = 0;
-    for c in 0..n {
-        let (b, t, l, s) = (b[c] * b[c], t[c] * t[c], l[c] * l[c], s[c] * s[c]);
-        let (kb, kt) = (larger(k0[c], k0[c + 1]), larger(k1[c], k1[c + 1]));
-        let (qb, qt) = (smaller(q0[c], q0[c + 1]), smaller(q1[c], q1[c + 1]));
-        let slopes = [larger(kb, k1[c]), larger(kb, k1[c + 1]), larger(kt, k0[c]), larger(kt, k0[c + 1])];
-        let ratios = [smaller(qb, q1[c]), smaller(qb, q1[c + 1]), smaller(qt, q0[c]), smaller(qt, q0[c + 1])];
-        let most = |n: usize| (slopes[n] * ratios[n]) * (slopes[n] * ratios[n]);
-        let most = [most(0), most(1), most(2), most(3)];
-        let parts = [tau * slopes[0], tau * slopes[1], tau * slopes[2], tau * slopes[3]];
-        let [bl, bs, tl, ts] = weights([b + l, b + s, t + l, t + s], most, tau, parts);
-        low[c] = bl + bs;
-        high[c] = tl + ts;
-        left[c] = bl + tl;
-        right[c] = bs + ts;
-        steep |= u64::from((bl + bs) + (tl + ts) > 0.0);
-    }
-    steep != 0
 }

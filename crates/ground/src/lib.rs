@@ -68,8 +68,10 @@
 
 #![warn(missing_docs)]
 
+mod barrier;
 mod bearing;
 mod clock;
+mod clods;
 mod coat;
 mod contour;
 mod cover;
@@ -80,13 +82,16 @@ mod heading;
 mod heap;
 mod kernel;
 mod load;
+mod marks;
 mod material;
 mod mesh;
 mod noise;
+mod order;
 mod particles;
 mod pattern;
 mod pour;
 mod press;
+mod reader;
 mod relief;
 mod resist;
 mod rules;
@@ -94,8 +99,10 @@ mod setup;
 mod slide;
 mod slip;
 mod spans;
+mod squares;
 pub mod study;
 mod tile;
+mod way;
 mod wedge;
 
 pub use bearing::{Bearing, Drive, Stand};

@@ -31,6 +31,11 @@ pub struct Soil {
     pub stick: f64,
     /// Time constant in s with which bodies that have left the ground shed what sticks to them.
     pub shed: f64,
+    /// Acceleration of a body in m/s² from which on it sheds all that is due; the less it is accelerated, the more it keeps ([`Soil::part_let_go`]). It sheds
+    /// however it moves if nothing is said.
+    pub hold: Option<f64>,
+    /// The power with which what is let go follows the acceleration.
+    pub exponent: f64,
     /// Diameter in m of the particles that leave bodies; a quarter of a column if nothing is said.
     pub grain: Option<f64>,
 }
@@ -84,12 +89,14 @@ impl Soil {
             swell: 0.0,
             stick: 0.0,
             shed: SHED,
+            hold: None,
+            exponent: 1.0,
             grain: None,
         }
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let Soil { repose, inner, push, rough, flow, cohesion, weight, bearing, swell, stick, shed, grain } =
+        let Soil { repose, inner, push, rough, flow, cohesion, weight, bearing, swell, stick, shed, .. } =
             *self;
         check("an angle of repose (°)", repose, repose > 0.1 && repose <= STEEPEST, "0.1 to 89.96")?;
         let steeper = inner >= repose && inner <= STEEPEST;
@@ -104,8 +111,20 @@ impl Soil {
         check("a swelling", swell, (0.0..=1.0).contains(&swell), "0 to 1")?;
         check("what sticks to an area (m)", stick, (0.0..=1.0).contains(&stick), "0 to 1")?;
         check("a time constant of shedding (s)", shed, (1e-6..=1e6).contains(&shed), "1e-6 to 1e6")?;
-        let grain = grain.unwrap_or(1.0);
+        let hold = self.hold.unwrap_or(1.0);
+        let most = "more than 0, at most 1e6";
+        check("an acceleration that sheds all (m/s²)", hold, hold > 0.0 && hold <= 1e6, most)?;
+        let exponent = self.exponent;
+        let most = "more than 0, at most 100";
+        check("an exponent of what is shed", exponent, exponent > 0.0 && exponent <= 100.0, most)?;
+        let grain = self.grain.unwrap_or(1.0);
         check("a diameter of particles (m)", grain, (1e-6..=1e3).contains(&grain), "1e-6 to 1000")
+    }
+
+    /// The part of what a body sheds that it lets go with an acceleration a in m/s²: (a/`hold`)^`exponent`, at most 1, and always 1 without `hold` (Sumner, O'Brien,
+    /// Hodgins, section 3.2, where it is the probability of a particle). The other part stays.
+    pub fn part_let_go(&self, acceleration: f64) -> f64 {
+        self.hold.map_or(1.0, |hold| libm::pow(acceleration / hold, self.exponent).min(1.0))
     }
 
     /// Tangent of the angle of repose.

@@ -14,7 +14,7 @@ use crate::{Ground, Piece, Vector};
 pub struct Mesh {
     /// Points in m.
     pub points: Vec<Vector>,
-    /// How far what is seen at each point has slid, in m along x and z; empty where that is not followed.
+    /// How far what is seen at the first points has slid, in m along x and z; empty where that is not followed. It is not of the points after these.
     pub slid: Vec<[f64; 2]>,
     /// Triangles as numbers of points, counterclockwise as seen from above.
     pub triangles: Vec<[u32; 3]>,
@@ -32,10 +32,9 @@ impl Mesh {
     /// Adds another mesh.
     pub fn append(&mut self, other: &Mesh) {
         let first = self.points.len() as u32;
-        if !self.slid.is_empty() || !other.slid.is_empty() {
+        if !other.slid.is_empty() {
             self.slid.resize(self.points.len(), [0.0; 2]);
             self.slid.extend(&other.slid);
-            self.slid.resize(self.points.len() + other.points.len(), [0.0; 2]);
         }
         self.points.extend(&other.points);
         self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|n| first + n)));

@@ -1,19 +1,22 @@
 //! Particles: material in the air. They fly as projectiles, in closed form, land on the surface as it is in their tick, and join what they land on
-//! (Sumner, O'Brien, Hodgins, section 3.2).
+//! (Sumner, O'Brien, Hodgins, section 3.2). From bodies that they meet from the side or from below they rebound.
 //!
 //! A path crosses columns at a uniform speed in plan, so over each square of columns its height above the surface is a polynomial of degree two in the time.
 //! Its root is the landing.
 
 use std::sync::Arc;
 
-use crate::load::Floor;
+use crate::barrier::Barriers;
+use crate::load::{Floor, Parcel};
 use crate::tile::QUANTA;
-use crate::{Error, Ground, Mesh, Vector};
+use crate::{Body, Error, Ground, Mesh, Vector};
 
 /// Gravity in m/s².
-const GRAVITY: f64 = 9.81;
+pub(crate) const GRAVITY: f64 = 9.81;
 /// Most particles in the air.
 const MOST: usize = 1 << 17;
+/// Most contacts with bodies in a tick: what is thrown to and fro between them more often stays there.
+const CONTACTS: usize = 16;
 
 /// A particle at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +51,14 @@ struct Landing {
     height: i64,
 }
 
+/// What becomes of a particle in a span of time.
+enum End {
+    Flies(Particle),
+    Lands(Landing),
+    /// It comes to rest on a body, at a place in it as it is where its points are known.
+    Rests(u64, Vector),
+}
+
 /// Heights in m above which nothing can be met: of the surface, and of what lies on bodies.
 struct Tops {
     surface: f64,
@@ -56,9 +67,25 @@ struct Tops {
 
 impl Particle {
     /// Its place at a time.
-    fn at(&self, time: f64) -> Vector {
+    pub fn at(&self, time: f64) -> Vector {
         let t = (time - self.born).max(0.0);
         self.place + self.velocity * t - Vector::y() * (0.5 * GRAVITY * t * t)
+    }
+
+    /// Its velocity at a time.
+    pub fn speed_at(&self, time: f64) -> Vector {
+        self.velocity - Vector::y() * (GRAVITY * (time - self.born).max(0.0))
+    }
+
+    /// The particle as it is seen from what moves with a velocity and is where it is at a time.
+    pub fn seen_from(&self, velocity: Vector, time: f64) -> Particle {
+        let place = self.place - velocity * (self.born - time);
+        Particle { place, velocity: self.velocity - velocity, ..*self }
+    }
+
+    /// Its greatest height within a span of time.
+    pub fn highest(&self, [from, to]: [f64; 2]) -> f64 {
+        self.at((self.born + self.velocity.y / GRAVITY).clamp(from, to)).y
     }
 
     /// The last time at which it is at a height.
@@ -140,22 +167,25 @@ impl Ground {
         mesh
     }
 
-    /// Lets particles join what they come down on within a span of time.
-    pub(crate) fn land(&mut self, span: [f64; 2]) -> Result<(), Error> {
+    /// Lets particles join what they come down on within a tick, and rebound from bodies, which are where the tick begins.
+    pub(crate) fn land(&mut self, bodies: &[Body], span: [f64; 2]) -> Result<(), Error> {
         if self.particles.is_empty() {
             return Ok(());
         }
-        let tops = self.tops();
-        let landings = self.particles.iter().map(|particle| self.landing(particle, span, &tops));
-        let landings: Vec<Option<Landing>> = landings.collect();
-        if landings.iter().all(Option::is_none) {
+        let (tops, barriers) = (self.tops(), self.barriers_before(bodies, span[0]));
+        let before = Arc::clone(&self.particles);
+        let ends: Vec<End> =
+            before.iter().map(|particle| self.fly(particle, span, &tops, &barriers)).collect();
+        let goes_on =
+            |(end, before): (&End, &Particle)| matches!(end, End::Flies(particle) if particle == before);
+        if ends.iter().zip(before.iter()).all(goes_on) {
             return Ok(());
         }
-        let mut flying = Vec::with_capacity(landings.len());
-        for (particle, landing) in Arc::clone(&self.particles).iter().zip(landings) {
-            match landing {
-                Some(landing) => self.join(particle, &landing)?,
-                None => flying.push(*particle),
+        let mut flying = Vec::with_capacity(ends.len());
+        for (particle, end) in before.iter().zip(ends) {
+            match end {
+                End::Flies(particle) => flying.push(particle),
+                end => self.join(particle.volume, end)?,
             }
         }
         self.particles = Arc::new(flying);
@@ -163,23 +193,55 @@ impl Ground {
     }
 
     /// Adds a particle, which flies up to the end of a tick, if it does not come down before.
-    pub(crate) fn throw(&mut self, particle: Particle, end: f64) -> Result<(), Error> {
+    pub(crate) fn throw(&mut self, particle: Particle, end: f64, barriers: &Barriers) -> Result<(), Error> {
         // Only its own surroundings matter: it is one of many.
         let tops = Tops { surface: f64::INFINITY, floors: f64::INFINITY };
-        if let Some(landing) = self.landing(&particle, [particle.born, end], &tops) {
-            return self.join(&particle, &landing);
+        match self.fly(&particle, [particle.born, end], &tops, barriers) {
+            End::Flies(particle) => {
+                if self.particles.len() >= MOST {
+                    let at = [particle.place.x, particle.place.z];
+                    return Err(Error::Particles { most: MOST, at });
+                }
+                Arc::make_mut(&mut self.particles).push(particle);
+                Ok(())
+            }
+            end => self.join(particle.volume, end),
         }
-        if self.particles.len() >= MOST {
-            let at = [particle.place.x, particle.place.z];
-            return Err(Error::Particles { most: MOST, at });
-        }
-        Arc::make_mut(&mut self.particles).push(particle);
-        Ok(())
     }
 
-    fn join(&mut self, particle: &Particle, landing: &Landing) -> Result<(), Error> {
+    /// What becomes of a particle in a span of time.
+    fn fly(&self, particle: &Particle, [from, to]: [f64; 2], tops: &Tops, barriers: &Barriers) -> End {
+        let (mut particle, mut from, cell) = (*particle, from.max(particle.born), self.cell());
+        if from > to {
+            return End::Flies(particle);
+        }
+        let mut last = None;
+        for _ in 0..CONTACTS {
+            let landing = self.landing(&particle, [from, to], tops);
+            let until = landing.as_ref().map_or(to, |landing| landing.time);
+            let Some(contact) = barriers.first(&particle, [from, until], cell) else {
+                return landing.map_or(End::Flies(particle), End::Lands);
+            };
+            if contact.is_flat() {
+                return End::Rests(contact.body, contact.place);
+            }
+            last = Some(contact);
+            (particle, from) = (contact.after(&particle, cell), contact.time);
+        }
+        last.map_or(End::Flies(particle), |contact| End::Rests(contact.body, contact.place))
+    }
+
+    /// Adds a volume to what a particle comes down on.
+    fn join(&mut self, volume: i64, end: End) -> Result<(), Error> {
         self.stirred |= !self.floors.is_empty();
-        self.drop(landing.column, landing.height, particle.volume)
+        match end {
+            End::Flies(_) => Ok(()),
+            End::Lands(landing) => self.drop(landing.column, landing.height, volume),
+            End::Rests(body, place) => {
+                let (column, base) = (self.nearest(place), (place.y / self.cell() * QUANTA) as i64);
+                self.put(body, Parcel { column, base, load: volume, offset: [0; 2] })
+            }
+        }
     }
 
     fn tops(&self) -> Tops {
@@ -273,6 +335,7 @@ fn descent([first, middle, last]: [f64; 3]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::{Particle, descent};
+    use crate::barrier::Barriers;
     use crate::{Description, Error, Extent, Ground, Relief, Settings, Soil, Vector};
 
     #[test]
@@ -304,7 +367,8 @@ mod tests {
         };
         let mut ground = Ground::new(description, Settings::default())?;
         let (place, velocity) = (Vector::new(0.1, 0.5, 0.2), Vector::new(1.1, 2.0, -0.7));
-        ground.throw(Particle { id: 1, born: 0.003, place, velocity, volume: 12_345 }, 1.0 / 120.0)?;
+        let thrown = Particle { id: 1, born: 0.003, place, velocity, volume: 12_345 };
+        ground.throw(thrown, 1.0 / 120.0, &Barriers::default())?;
         ground.book.poured += 12_345;
         // y + vt - gt²/2 = slope (x + ut).
         let (fall, over) = (velocity.y - slope * velocity.x, place.y - slope * place.x);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::error::check;
 use crate::kernel::to_float;
 use crate::relief::quanta;
-use crate::tile::{HIGHEST, QUANTA};
+use crate::tile::{COLUMN_BYTES, HIGHEST, QUANTA};
 use crate::{Error, Ground};
 
 /// Material that is added.
@@ -97,7 +97,7 @@ impl Ground {
         check("a coordinate of a pour (m)", centre[0], true, "a finite number")?;
         check("a coordinate of a pour (m)", centre[1], true, "a finite number")?;
         check("a radius of a pour (m)", radius, radius >= 0.0, "0 or more")?;
-        let columns = self.disc(centre, radius);
+        let columns = self.disc(centre, radius)?;
         let cell = self.cell();
         let Some(&(first, _)) = columns.first() else {
             return Err(Error::Outside { name: "a pour".to_owned(), at: centre });
@@ -139,7 +139,11 @@ impl Ground {
     }
 
     /// The columns within a distance of a centre, or the nearest one; none if that is beyond the edges.
-    fn disc(&self, centre: [f64; 2], radius: f64) -> Vec<(i32, i32)> {
+    ///
+    /// # Errors
+    ///
+    /// They need more memory than allowed.
+    fn disc(&self, centre: [f64; 2], radius: f64) -> Result<Vec<(i32, i32)>, Error> {
         let (extent, cell) = (self.extent(), self.cell());
         let [x, z] = centre.map(|at| at / cell);
         let radius = radius / cell;
@@ -151,6 +155,15 @@ impl Ground {
         let ((i0, i1), (k0, k1)) = (range(x, extent.x), range(z, extent.z));
         let mut all = Vec::new();
         if i0 <= i1 && k0 <= k1 {
+            let wide = |k: f64| {
+                let half = (radius * radius - (k - z).powi(2)).max(0.0).sqrt();
+                ((x + half).min(i1) - (x - half).max(i0)).max(0.0)
+            };
+            let count: f64 = (k0 as i32..=k1 as i32).map(|k| wide(f64::from(k))).sum();
+            let most = self.setup.settings.memory;
+            if count * COLUMN_BYTES as f64 > (most as f64) * 1_048_576.0 {
+                return Err(Error::Memory { most, at: centre });
+            }
             for k in k0 as i32..=k1 as i32 {
                 for i in i0 as i32..=i1 as i32 {
                     let (u, v) = (f64::from(i) - x, f64::from(k) - z);
@@ -165,6 +178,6 @@ impl Ground {
         if all.is_empty() && near(nearest.0, extent.x) && near(nearest.1, extent.z) {
             all.push((nearest.0 as i32, nearest.1 as i32));
         }
-        all
+        Ok(all)
     }
 }

@@ -5,15 +5,17 @@
 //! falling distance from the rim; one that moves sideways pushes all of it, to columns ahead. What comes to lie under the body is moved on. Which of the two a body does is
 //! decided where it touches the material: a wheel that rolls sinks in, whatever its axle does.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use crate::barrier::Barriers;
 use crate::contour::Contours;
 use crate::cover::{Foot, reach_of};
 use crate::heading::{Heading, Motions, Total};
 use crate::load::{Floor, Parcel};
-use crate::spans::{Place, Span, carried, join, of_mesh, of_surface, of_way};
+use crate::reader::Reader;
+use crate::spans::{Place, Span, carried, join, of_mesh, of_surface};
 use crate::tile::QUANTA;
+use crate::way::Way;
 use crate::{Error, Ground, Vector};
 
 /// A closed mesh of triangles, or a shelf, and its way in a tick.
@@ -99,7 +101,8 @@ impl Ground {
             if body.shelf {
                 // Under the ground it is not there.
                 spans = of_surface(&foot.places, &body.triangles);
-                spans.retain(|span| span.top >= self.top(span.column.0, span.column.1));
+                let mut reader = Reader::new(self);
+                spans.retain(|span| span.top >= reader.top(span.column));
             } else {
                 spans = of_mesh(&body.name, &foot.places, &body.triangles, cell)?;
                 foot.undersides = spans.iter().map(|span| (span.column, span.bottom)).collect();
@@ -107,7 +110,9 @@ impl Ground {
                 way = spans.clone();
                 let passed = before.as_ref().filter(|before| before.places.len() == foot.places.len());
                 if let Some(before) = passed {
-                    way.extend(of_way(&before.places, &foot.places, &body.triangles, highest));
+                    let mut reader = Reader::new(self);
+                    let passed = Way { from: &before.places, to: &foot.places, highest };
+                    passed.spans(&body.triangles, |column| reader.top(column), &mut way);
                     join(&mut way);
                 }
             }
@@ -155,7 +160,7 @@ impl Ground {
             for (column, floor) in loads {
                 self.drop(column, floor.top(), floor.load)?;
             }
-            self.let_go(id, span)?;
+            self.let_go(id, span, &Barriers::default())?;
         }
         Ok(())
     }
@@ -172,61 +177,75 @@ impl Ground {
     }
 
     fn check_inside(&self, body: &Body, way: &[Span]) -> Result<(), Error> {
-        let highest = |(i, k): (i32, i32)| self.top(i, k);
-        let outside = way.iter().find(|span| {
-            !self.extent().contains(span.column.0, span.column.1) && span.bottom < highest(span.column)
-        });
+        let extent = self.extent();
+        // Beyond the edge there is as much as at the edge, or as there was before the body lowered that.
+        let level = |(i, k): (i32, i32)| {
+            let (at, along) = extent.mirrored(i, k);
+            let before = self.setup.untouched(at, along).unwrap_or_default().iter().sum::<i64>();
+            self.top(i, k).max(before + self.book.fallen)
+        };
+        let outside = way
+            .iter()
+            .find(|span| !extent.contains(span.column.0, span.column.1) && span.bottom < level(span.column));
         outside.map_or(Ok(()), |span| {
             let at = [span.column.0, span.column.1].map(|at| f64::from(at) * self.cell());
             Err(Error::Outside { name: body.name.clone(), at })
         })
     }
 
+    /// The spans of a way that reach into the ground, by columns, with the heights of these.
+    fn pierced<'w>(&self, way: &'w [Span]) -> Vec<(&'w [Span], i64)> {
+        let (mut reader, extent) = (Reader::new(self), self.extent());
+        let columns = way.chunk_by(|a, b| a.column == b.column);
+        let inside = columns.filter(|spans| extent.contains(spans[0].column.0, spans[0].column.1));
+        let tops = inside.map(|spans| (spans, reader.top(spans[0].column)));
+        tops.filter(|(spans, top)| top - spans[0].bottom > SKIN).collect()
+    }
+
     /// Removes what a body has passed, and puts it around the body. What is above it comes to lie on it.
     fn displace(&mut self, body: u64, way: &[Span], motions: &Motions) -> Result<(), Error> {
-        let mut moved: BTreeMap<(i32, i32), i64> = BTreeMap::new();
+        let mut moved: Vec<((i32, i32), i64)> = Vec::new();
         let sunk = (self.soil().push * PARTS as f64).round() as i64;
         let mut total = Total::default();
-        let extent = self.extent();
-        for spans in way.chunk_by(|a, b| a.column == b.column) {
+        for (spans, height) in self.pierced(way) {
             let (column, bottom) = (spans[0].column, spans[0].bottom);
-            if !extent.contains(column.0, column.1) {
-                continue;
-            }
-            let height = self.top(column.0, column.1);
             let mut volume = self.lower(column, bottom)?;
             if volume == 0 {
                 continue;
             }
             // From above: what is between the parts of the body stays.
-            let mut above = height;
+            let (mut above, mut gone) = (height, 0);
             for span in spans.iter().rev() {
                 let part = (height.min(above) - span.top).clamp(0, volume);
                 above = span.bottom;
                 volume -= part;
-                *moved.entry(column).or_insert(0) += self.lay(body, column, span.top, part)?;
+                gone += self.lay(body, column, span.top, part)?;
             }
             let motion = motions.of(spans[0].sole);
             total.add(motion, volume);
             let push = if Heading::of(motion).sinks { sunk } else { PARTS };
             let pushed = (i128::from(volume) * i128::from(push) / i128::from(PARTS)) as i64;
             self.pack(column, volume - pushed)?;
-            *moved.entry(column).or_insert(0) += pushed;
+            gone += pushed;
+            if gone > 0 {
+                moved.push((column, gone));
+            }
         }
-        moved.retain(|_, volume| *volume > 0);
         let heading = Heading::of(total.mean());
         // Each round, columns that were filled up to the body join those that material has to leave.
-        let mut full: BTreeSet<(i32, i32)> = BTreeSet::new();
+        let mut full: Vec<(i32, i32)> = Vec::new();
         while !moved.is_empty() {
-            full.extend(moved.keys());
+            full.extend(moved.iter().map(|(column, _)| *column));
+            full.sort_unstable();
+            full.dedup();
             let landed = self.spread(moved, &full, heading)?;
-            moved = BTreeMap::new();
+            moved = Vec::new();
             for column in landed {
                 let roof = self.roof(column);
                 if roof != i64::MAX {
                     let excess = self.lower(column, roof)?;
                     if excess > 0 {
-                        moved.insert(column, excess);
+                        moved.push((column, excess));
                     }
                 }
             }
@@ -274,48 +293,67 @@ impl Ground {
         Ok(())
     }
 
-    /// Moves volumes from full columns outward, from those farthest from the rim on, and returns where they land.
+    /// Moves volumes from full columns, which are in order, outward, from those farthest from the rim on, and returns where they land, in order.
     fn spread(
         &mut self,
-        mut moved: BTreeMap<(i32, i32), i64>,
-        full: &BTreeSet<(i32, i32)>,
+        moved: Vec<((i32, i32), i64)>,
+        full: &[(i32, i32)],
         heading: Heading,
-    ) -> Result<BTreeSet<(i32, i32)>, Error> {
-        let (contours, mut landed) = (Contours::of(full, self.extent()), BTreeSet::new());
-        for (column, ring) in contours.inward_first() {
-            let Some(volume) = moved.remove(&column) else { continue };
-            let lower = |(di, dk): &(i32, i32)| {
-                let to = (column.0 + di, column.1 + dk);
-                let outward = contours.ring(to).is_none_or(|other| other < ring);
-                outward && self.extent().contains(to.0, to.1)
-            };
-            let ahead =
-                |(di, dk): &(i32, i32)| heading.x * i128::from(*di) + heading.z * i128::from(*dk) >= 0;
-            let mut targets: Vec<_> = AROUND.into_iter().filter(lower).collect();
-            if !heading.sinks && targets.iter().any(ahead) {
-                targets.retain(ahead);
+    ) -> Result<Vec<(i32, i32)>, Error> {
+        let (contours, extent) = (Contours::of(full, self.extent()), self.extent());
+        // By the number of a full column.
+        let mut volumes = vec![0; full.len()];
+        for (column, volume) in moved {
+            if let Some(number) = contours.number(column) {
+                volumes[number] += volume;
             }
-            let count = targets.len() as i64;
+        }
+        let mut landed: Vec<((i32, i32), i64)> = Vec::new();
+        for number in contours.inward_first() {
+            let (column, ring) = contours.column(number);
+            let volume = std::mem::take(&mut volumes[number]);
+            if volume == 0 {
+                continue;
+            }
+            let target = |(di, dk): (i32, i32)| {
+                let to = (column.0 + di, column.1 + dk);
+                let ahead = heading.sinks || heading.x * i128::from(di) + heading.z * i128::from(dk) >= 0;
+                let number = contours.number(to);
+                let outward =
+                    number.map_or(extent.contains(to.0, to.1), |number| contours.is_below(number, ring));
+                outward.then_some((to, number, ahead))
+            };
+            let all = AROUND.map(target);
+            let has_ahead = all.iter().flatten().any(|(.., ahead)| *ahead);
+            let targets = all.into_iter().flatten().filter(|(.., ahead)| *ahead || !has_ahead);
+            let count = targets.clone().count() as i64;
             let share = if count > 0 { volume / count } else { 0 };
             // What cannot be divided equally, and what cannot go anywhere, is compressed.
             self.pack(column, volume - share * count)?;
-            for (di, dk) in targets {
-                let to = (column.0 + di, column.1 + dk);
-                if contours.ring(to).is_some() {
-                    *moved.entry(to).or_insert(0) += share;
-                } else {
-                    let (key, index) = self.setup.place(to.0, to.1);
-                    self.ensure(key)?;
-                    self.tile_mut(key)?.loose[index] += share;
-                    landed.insert(to);
+            for (to, number, _) in targets {
+                match number {
+                    Some(number) => volumes[number] += share,
+                    None => landed.push((to, share)),
                 }
             }
         }
         // Columns from which no way leads to a free one.
-        for (column, volume) in moved {
-            self.pack(column, volume)?;
+        for (number, volume) in volumes.into_iter().enumerate().filter(|(_, volume)| *volume > 0) {
+            self.pack(contours.column(number).0, volume)?;
         }
-        self.wake_all(landed.iter().copied().collect())?;
+        landed.sort_unstable_by_key(|(column, _)| *column);
+        landed.dedup_by(|next, sum| {
+            let same = next.0 == sum.0;
+            sum.1 += if same { next.1 } else { 0 };
+            same
+        });
+        for &((i, k), volume) in &landed {
+            let (key, index) = self.setup.place(i, k);
+            self.ensure(key)?;
+            self.tile_mut(key)?.loose[index] += volume;
+        }
+        let landed: Vec<_> = landed.into_iter().map(|(column, _)| column).collect();
+        self.wake_all(landed.iter().copied())?;
         Ok(landed)
     }
 }

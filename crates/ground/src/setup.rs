@@ -37,9 +37,9 @@ pub(crate) struct Setup {
 impl Setup {
     /// Tile and index in it of a column.
     pub fn place(&self, i: i32, k: i32) -> (Key, usize) {
-        let side = self.side;
-        let key = (i.div_euclid(side), k.div_euclid(side));
-        (key, (k.rem_euclid(side) * side + i.rem_euclid(side)) as usize)
+        // Sides are powers of two.
+        let (shift, last) = (self.side.trailing_zeros(), self.side - 1);
+        ((i >> shift, k >> shift), (((k & last) << shift) | (i & last)) as usize)
     }
 
     /// The column of an index in a tile.

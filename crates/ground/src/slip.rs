@@ -241,7 +241,11 @@ impl<'a> Worker<'a> {
         self.gather_awake(&tiles, inside);
         let (rows, places) = if full { (HALO..HALO + side, HALO..HALO + side) } else { self.reach(side)? };
         let around = (rows.start - HALO..rows.end + HALO, places.start - HALO..places.end + HALO);
-        let mut traits = Traits::default();
+        // A little less than any, where they differ from place to place.
+        let least = self.law.slope
+            * (1.0 - ground.soil().rough)
+            * if ground.soil().rough > 0.0 { 0.999 } else { 1.0 };
+        let mut traits = Traits { least, ..Traits::default() };
         if inside {
             self.gather(&tiles, &around.0);
         } else {
@@ -259,10 +263,10 @@ impl<'a> Worker<'a> {
             bare != 0
         });
         if traits.varied {
-            self.gather_slopes(&tiles, &around);
+            self.gather_slopes(&tiles, &around, inside);
         }
         if traits.roofed {
-            self.gather_roofs(&roofs, &tiles, &around);
+            self.gather_roofs(&roofs, &tiles, &around, inside);
         }
         self.block.flow(self.law, &rows, &places, traits);
         let mut loose = tile.loose.clone();
@@ -302,14 +306,41 @@ impl<'a> Worker<'a> {
         (!rows.is_empty() && !places.is_empty()).then_some((rows, places))
     }
 
-    /// For each row of the block, the neighbours in its row and the row in these.
-    fn neighbours<'b>(tiles: &'b Around<'b>, r: usize, side: usize) -> ([Option<&'b Tile>; 3], usize) {
-        let (band, row) = match r {
+    /// For a row of the block, the number of the tiles in that row of tiles, and the row in these.
+    fn band(r: usize, side: usize) -> (usize, usize) {
+        match r {
             r if r < HALO => (0, side + r - HALO),
             r if r < HALO + side => (1, r - HALO),
             r => (2, r - HALO - side),
-        };
-        ([tiles[3 * band], tiles[3 * band + 1], tiles[3 * band + 2]], row)
+        }
+    }
+
+    /// The parts of a row of the block that three tiles have: the number of the tile, where the part is in the block, and where in the tile.
+    fn parts(r: usize, row: usize, side: usize, width: usize) -> [(usize, Range<usize>, Range<usize>); 3] {
+        let (before, after, at) = (row * side, (row + 1) * side, r * width);
+        [
+            (0, at..at + HALO, after - HALO..after),
+            (1, at + HALO..at + HALO + side, before..after),
+            (2, at + HALO + side..at + width, before..before + HALO),
+        ]
+    }
+
+    /// Calls a function with each part of rows of the block: where it is there, its tile, and where in that.
+    fn each_part(
+        &mut self,
+        tiles: &Around,
+        rows: &Range<usize>,
+        mut put: impl FnMut(&mut Block, Range<usize>, &Tile, Range<usize>),
+    ) {
+        let (side, width) = (self.ground.setup.settings.side, self.block.width);
+        for r in rows.clone() {
+            let (band, row) = Self::band(r, side);
+            for (number, to, from) in Self::parts(r, row, side, width) {
+                if let Some(tile) = tiles[3 * band + number] {
+                    put(&mut self.block, to, tile, from);
+                }
+            }
+        }
     }
 
     /// Finds the columns that stand for those of the block: themselves, or their mirror images.
@@ -330,7 +361,8 @@ impl<'a> Worker<'a> {
         let side = self.ground.setup.settings.side;
         for r in 0..self.block.width {
             self.awake[r] = if inside {
-                let (three, row) = Self::neighbours(tiles, r, side);
+                let (band, row) = Self::band(r, side);
+                let three = [tiles[3 * band], tiles[3 * band + 1], tiles[3 * band + 2]];
                 let bits = three.map(|tile| tile.map_or(0, |tile| u64::from(tile.awake[row])));
                 (bits[0] >> (side - HALO)) | (bits[1] << HALO) | ((bits[2] & 3) << (HALO + side))
             } else {
@@ -349,26 +381,17 @@ impl<'a> Worker<'a> {
 
     /// Heights and loose material of rows of the block.
     fn gather(&mut self, tiles: &Around, rows: &Range<usize>) {
-        let (side, width) = (self.ground.setup.settings.side, self.block.width);
-        for r in rows.clone() {
-            let (three, row) = Self::neighbours(tiles, r, side);
-            let (before, after) = (row * side, (row + 1) * side);
-            let parts =
-                [(0, after - HALO..after), (HALO, before..after), (HALO + side, before..before + HALO)];
-            for (tile, (to, from)) in three.into_iter().zip(parts) {
-                let Some(tile) = tile else { continue };
-                let (bed, bonded, loose) =
-                    (&tile.bed[from.clone()], &tile.bonded[from.clone()], &tile.loose[from]);
-                let (n, at) = (loose.len(), r * width + to);
-                let heights = &mut self.block.height[at..at + n];
-                for (((height, bed), bonded), loose) in heights.iter_mut().zip(bed).zip(bonded).zip(loose) {
-                    *height = to_float(bed.wrapping_add(*bonded).wrapping_add(*loose));
-                }
-                for (to, loose) in self.block.loose[at..at + n].iter_mut().zip(loose) {
-                    *to = to_float(*loose);
-                }
+        self.each_part(tiles, rows, |block, to, tile, from| {
+            let (bed, bonded, loose) =
+                (&tile.bed[from.clone()], &tile.bonded[from.clone()], &tile.loose[from]);
+            let heights = &mut block.height[to.clone()];
+            for (((height, bed), bonded), loose) in heights.iter_mut().zip(bed).zip(bonded).zip(loose) {
+                *height = to_float(bed.wrapping_add(*bonded).wrapping_add(*loose));
             }
-        }
+            for (to, loose) in block.loose[to].iter_mut().zip(loose) {
+                *to = to_float(*loose);
+            }
+        });
     }
 
     /// Calls a function with each place in rows and places of the block, the tile of the column that is there, and its number and the index in it.
@@ -400,27 +423,68 @@ impl<'a> Worker<'a> {
         });
     }
 
-    fn gather_slopes(&mut self, tiles: &Around, around: &Area) {
+    fn gather_slopes(&mut self, tiles: &Around, around: &Area, inside: bool) {
         let (ground, law, width) = (self.ground, self.law, self.block.width);
         let (rows, places) = around;
-        if tiles.iter().flatten().any(|tile| tile.pressed || tile.slope.is_some()) {
-            let inner = law.slope * (ground.soil().inner_slope() / ground.soil().slope());
+        let inner = law.slope * (ground.soil().inner_slope() / ground.soil().slope());
+        if !tiles.iter().flatten().any(|tile| tile.pressed || tile.slope.is_some()) {
+            self.block.slope[rows.start * width..rows.end * width].fill(law.slope);
+        } else if inside {
+            self.each_part(tiles, rows, |block, to, tile, from| {
+                let to = &mut block.slope[to];
+                match &tile.slope {
+                    Some(slope) => to.copy_from_slice(&slope[from.clone()]),
+                    None => to.fill(law.slope),
+                }
+                if tile.pressed {
+                    for (slope, packed) in to.iter_mut().zip(&tile.packed[from]) {
+                        *slope = if *packed > 0 { inner } else { *slope };
+                    }
+                }
+            });
+        } else {
             self.each(tiles, around, |block, at, tile, _, index| {
                 let outer = tile.slope.as_ref().map_or(law.slope, |slope| slope[index]);
                 block.slope[at] = if tile.packed[index] > 0 { inner } else { outer };
             });
-        } else {
-            self.block.slope[rows.start * width..rows.end * width].fill(law.slope);
         }
         for r in rows.clone() {
             let (bits, row) = (self.awake[r], &mut self.block.ratio[r * width..(r + 1) * width]);
-            for c in places.clone() {
-                row[c] = if bits >> c & 1 != 0 { law.rest } else { ground.setup.start };
+            let wanted = u64::MAX >> (64 - places.len()) << places.start;
+            match bits & wanted {
+                0 => row[places.clone()].fill(ground.setup.start),
+                all if all == wanted => row[places.clone()].fill(law.rest),
+                _ => {
+                    for c in places.clone() {
+                        row[c] = if bits >> c & 1 != 0 { law.rest } else { ground.setup.start };
+                    }
+                }
             }
         }
     }
 
-    fn gather_roofs(&mut self, roofs: &[Option<&[i64]>; 9], tiles: &Around, around: &Area) {
+    fn gather_roofs(&mut self, roofs: &[Option<&[i64]>; 9], tiles: &Around, around: &Area, inside: bool) {
+        if inside {
+            let side = self.ground.setup.settings.side;
+            for r in around.0.clone() {
+                let (band, row) = Self::band(r, side);
+                for (number, to, from) in Self::parts(r, row, side, self.block.width) {
+                    let room = &mut self.block.room[to];
+                    let (Some(tile), Some(roofs)) = (tiles[3 * band + number], roofs[3 * band + number])
+                    else {
+                        room.fill(f64::INFINITY);
+                        continue;
+                    };
+                    for ((room, roof), index) in room.iter_mut().zip(&roofs[from.clone()]).zip(from) {
+                        *room = match *roof {
+                            i64::MAX => f64::INFINITY,
+                            roof => to_float(roof - tile.top(index)),
+                        };
+                    }
+                }
+            }
+            return;
+        }
         self.each(tiles, around, |block, at, tile, number, index| {
             let roof = roofs[number].map_or(i64::MAX, |roofs| roofs[index]);
             block.room[at] = if roof == i64::MAX { f64::INFINITY } else { to_float(roof - tile.top(index)) };

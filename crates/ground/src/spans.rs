@@ -5,11 +5,16 @@
 
 use std::ops::{Mul, RangeInclusive, Sub};
 
+use crate::order::by_columns;
 use crate::tile::QUANTA;
 use crate::{Error, Vector};
 
 /// Places of the lattice in a cell, in plan.
 const LATTICE: f64 = 65_536.0;
+/// The same.
+pub(crate) const STEP: i64 = 65_536;
+/// Products of numbers below this need no wide integers.
+pub(crate) const NARROW: i64 = 1 << 30;
 /// Farthest point of a body, in cells.
 const FARTHEST: f64 = 2_097_152.0;
 
@@ -34,22 +39,9 @@ impl Place {
         })
     }
 
-    /// Whether there are columns in the rectangle around some places.
-    fn has_column(places: &[Place]) -> bool {
-        let has = |get: fn(&Place) -> i64| {
-            let (low, high) = places
-                .iter()
-                .map(get)
-                .fold((i64::MAX, i64::MIN), |(low, high), at| (low.min(at), high.max(at)));
-            Place::cells(low, true) <= Place::cells(high, false)
-        };
-        has(|at| at.x) && has(|at| at.z)
-    }
-
     /// The first column from a lattice place on, or the last one up to it.
-    fn cells(value: i64, up: bool) -> i32 {
-        let lattice = LATTICE as i64;
-        (if up { value + lattice - 1 } else { value }).div_euclid(lattice) as i32
+    pub fn cells(value: i64, up: bool) -> i32 {
+        (if up { value + STEP - 1 } else { value }).div_euclid(STEP) as i32
     }
 }
 
@@ -84,41 +76,72 @@ impl Scan {
         if rows.is_empty() || places.is_empty() {
             return;
         }
-        // Products of numbers below 2^30 need no wide integers.
-        if high - low < 1 << 30 && far - near < 1 << 30 {
-            self.cover::<i64>(number, [a, b, c], rows, places);
+        if high - low < NARROW && far - near < NARROW {
+            self.walk(number, [a, b, c], rows, places);
         } else {
-            self.cover::<i128>(number, [a, b, c], rows, places);
+            self.cover(number, [a, b, c], rows, places);
         }
     }
 
-    /// Adds what a triangle covers of a rectangle of columns, with integers that hold its area.
-    fn cover<T: Whole>(
+    /// Adds what a triangle covers of a rectangle of columns. From one column to the next, weights change by the same amount.
+    fn walk(
         &mut self,
         number: usize,
         [a, b, c]: [Place; 3],
         rows: RangeInclusive<i32>,
         places: RangeInclusive<i32>,
     ) {
-        let (none, area) = (T::from(0), cross::<T>(a, b, c));
-        if area == none {
+        let area = cross::<i64>(a, b, c);
+        if area == 0 {
             return;
         }
-        let ([b, c], side, area) = if area > none { ([b, c], -1, area) } else { ([c, b], 1, none - area) };
-        let lattice = LATTICE as i64;
+        let ([b, c], side, area) = if area > 0 { ([b, c], -1, area) } else { ([c, b], 1, -area) };
+        let edges = [(b, c), (c, a), (a, b)];
+        // A line on an edge belongs to one side: there, a weight of 0 counts as more.
+        let more = edges.map(|(from, to)| {
+            let (dx, dz) = (to.x - from.x, to.z - from.z);
+            i64::from(dz > 0 || dz == 0 && dx < 0)
+        });
+        let step = edges.map(|(from, to)| (from.z - to.z) * STEP);
+        for k in rows {
+            let at = Place { x: i64::from(*places.start()) * STEP, z: i64::from(k) * STEP, y: 0 };
+            let mut weights = edges.map(|(from, to)| cross::<i64>(from, to, at));
+            for i in places.clone() {
+                let [u, v, w] = weights;
+                if u + more[0] > 0 && v + more[1] > 0 && w + more[2] > 0 {
+                    let height = height_at([v, w], area, [a, b, c].map(|corner| corner.y));
+                    self.hits.push(((k, i), height, side, number as u32));
+                }
+                weights = [u + step[0], v + step[1], w + step[2]];
+            }
+        }
+    }
+
+    /// As [`walk`](Self::walk), for a triangle that is too large for narrow integers.
+    fn cover(
+        &mut self,
+        number: usize,
+        [a, b, c]: [Place; 3],
+        rows: RangeInclusive<i32>,
+        places: RangeInclusive<i32>,
+    ) {
+        let area = cross::<i128>(a, b, c);
+        if area == 0 {
+            return;
+        }
+        let ([b, c], side, area) = if area > 0 { ([b, c], -1, area) } else { ([c, b], 1, -area) };
         for k in rows {
             for i in places.clone() {
-                let at = Place { x: i64::from(i) * lattice, z: i64::from(k) * lattice, y: 0 };
+                let at = Place { x: i64::from(i) * STEP, z: i64::from(k) * STEP, y: 0 };
                 let weights = [(b, c), (c, a), (a, b)].map(|(from, to)| {
-                    let weight = cross::<T>(from, to, at);
+                    let weight = cross::<i128>(from, to, at);
                     let (dx, dz) = (to.x - from.x, to.z - from.z);
-                    (weight > none || weight == none && (dz > 0 || dz == 0 && dx < 0)).then_some(weight)
+                    (weight > 0 || weight == 0 && (dz > 0 || dz == 0 && dx < 0)).then_some(weight)
                 });
                 if let [Some(u), Some(v), Some(w)] = weights {
                     // Exact, so that the order of the points does not matter.
-                    let part = |weight: T, y: i64| weight.into() * i128::from(y);
-                    let sum: i128 = part(u, a.y) + part(v, b.y) + part(w, c.y);
-                    self.hits.push(((k, i), sum.div_euclid(area.into()) as i64, side, number as u32));
+                    let sum = u * i128::from(a.y) + v * i128::from(b.y) + w * i128::from(c.y);
+                    self.hits.push(((k, i), sum.div_euclid(area) as i64, side, number as u32));
                 }
             }
         }
@@ -126,13 +149,14 @@ impl Scan {
 
     /// The spans of what was added since the last time, and a column in which what was added is not closed.
     pub fn spans(&mut self, spans: &mut Vec<Span>) -> Option<(i32, i32)> {
-        self.hits.sort_unstable();
+        by_columns(&mut self.hits, |((k, i), ..)| (*i, *k));
         let mut open = None;
-        for column in self.hits.chunk_by(|a, b| a.0 == b.0) {
+        for column in self.hits.chunk_by_mut(|a, b| a.0 == b.0) {
+            column.sort_unstable();
             let (k, i) = column[0].0;
             // Inside is where the line has entered and left unequally often: meshes that are inside out have an inside, too.
             let (mut depth, mut bottom, mut sole) = (0, 0, 0);
-            for &(_, height, side, triangle) in column {
+            for &mut (_, height, side, triangle) in column {
                 if depth == 0 {
                     (bottom, sole) = (height, triangle);
                 }
@@ -151,10 +175,28 @@ impl Scan {
 }
 
 /// Integers of some width.
-trait Whole: Copy + Ord + From<i64> + Into<i128> + Sub<Output = Self> + Mul<Output = Self> {}
+trait Whole: From<i64> + Sub<Output = Self> + Mul<Output = Self> {}
 
 impl Whole for i64 {}
 impl Whole for i128 {}
+
+/// The height of a triangle with these heights of its corners, rounded down, where its second and third corner have these weights of an area: exact, so that
+/// the order of the corners does not matter.
+#[inline]
+pub(crate) fn height_at([v, w]: [i64; 2], area: i64, [a, b, c]: [i64; 3]) -> i64 {
+    let (to_b, to_c) = (b - a, c - a);
+    // A division of floats is fast, and off by some quanta at most.
+    let mut rise = ((v as f64 * to_b as f64 + w as f64 * to_c as f64) / area as f64) as i64;
+    let product = |x: i64, y: i64| i128::from(x) * i128::from(y);
+    let mut rest = product(v, to_b) + product(w, to_c) - product(rise, area);
+    while rest < 0 {
+        (rise, rest) = (rise - 1, rest + i128::from(area));
+    }
+    while rest >= i128::from(area) {
+        (rise, rest) = (rise + 1, rest - i128::from(area));
+    }
+    a + rise
+}
 
 /// Twice the area of a triangle in plan; positive if it turns from x to z. For 64 bits its points are within 2^30 of each other.
 fn cross<T: Whole>(a: Place, b: Place, c: Place) -> T {
@@ -162,9 +204,12 @@ fn cross<T: Whole>(a: Place, b: Place, c: Place) -> T {
     product(b.x - a.x, c.z - a.z) - product(b.z - a.z, c.x - a.x)
 }
 
-/// Puts spans in order, and joins those of a column that touch.
+/// Puts spans in order, those of equal ends as they are, and joins those of a column that touch.
 pub(crate) fn join(spans: &mut Vec<Span>) {
-    spans.sort_unstable_by_key(|span| (span.column.1, span.column.0, span.bottom, span.top));
+    by_columns(spans, |span| span.column);
+    for column in spans.chunk_by_mut(|a, b| a.column == b.column) {
+        column.sort_by_key(|span| (span.bottom, span.top));
+    }
     spans.dedup_by(|next, span| {
         let touches = next.column == span.column && next.bottom <= span.top;
         if touches && next.top > span.top {
@@ -204,7 +249,7 @@ pub(crate) fn of_surface(places: &[Place], triangles: &[[u32; 3]]) -> Vec<Span> 
     for (number, triangle) in triangles.iter().enumerate() {
         scan.triangle(number, triangle.map(|n| places[n as usize]));
     }
-    scan.hits.sort_unstable();
+    by_columns(&mut scan.hits, |((k, i), ..)| (*i, *k));
     let span = |&((k, i), height, _, triangle): &Hit| Span {
         column: (i, k),
         bottom: height,
@@ -217,33 +262,6 @@ pub(crate) fn of_surface(places: &[Place], triangles: &[[u32; 3]]) -> Vec<Span> 
     spans
 }
 
-/// The spans of what a mesh passes on its way between two places, without those at its ends; only triangles that come below a height count.
-pub(crate) fn of_way(from: &[Place], to: &[Place], triangles: &[[u32; 3]], highest: i64) -> Vec<Span> {
-    let (mut scan, mut spans) = (Scan::default(), Vec::new());
-    for (number, triangle) in triangles.iter().enumerate() {
-        let [a, b, c] = triangle.map(|n| n as usize);
-        let ends = [from[a], from[b], from[c], to[a], to[b], to[c]];
-        if ends.iter().all(|place| place.y > highest) || !Place::has_column(&ends) {
-            continue;
-        }
-        scan.triangle(number, [from[a], from[b], from[c]]);
-        scan.triangle(number, [to[c], to[b], to[a]]);
-        // Both triangles at an edge divide its way along the same diagonal.
-        for (a, b) in [(a, b), (b, c), (c, a)] {
-            if a < b {
-                scan.triangle(number, [from[b], from[a], to[a]]);
-                scan.triangle(number, [from[b], to[a], to[b]]);
-            } else {
-                scan.triangle(number, [from[b], from[a], to[b]]);
-                scan.triangle(number, [to[b], from[a], to[a]]);
-            }
-        }
-        scan.spans(&mut spans);
-    }
-    join(&mut spans);
-    spans
-}
-
 /// Where a load at a column and an offset from it in parts of the lattice is, after the triangle that it lies on has moved: column, offset, and how much
 /// higher, in quanta.
 pub(crate) fn carried(
@@ -251,8 +269,7 @@ pub(crate) fn carried(
     (i, k): (i32, i32),
     offset: [i64; 2],
 ) -> ((i32, i32), [i64; 2], i64) {
-    let lattice = LATTICE as i64;
-    let at = Place { x: i64::from(i) * lattice + offset[0], z: i64::from(k) * lattice + offset[1], y: 0 };
+    let at = Place { x: i64::from(i) * STEP + offset[0], z: i64::from(k) * STEP + offset[1], y: 0 };
     let [a, b, c] = corners.map(|(from, _)| from);
     let sign = if cross::<i128>(a, b, c) < 0 { -1 } else { 1 };
     // A place beside the triangle moves as the nearest part of its edges, roughly.
@@ -265,8 +282,8 @@ pub(crate) fn carried(
         (sum / total) as i64
     };
     let (x, z) = (at.x + mean(|(from, to)| to.x - from.x), at.z + mean(|(from, to)| to.z - from.z));
-    let nearest = |value: i64| (value + lattice / 2).div_euclid(lattice);
+    let nearest = |value: i64| (value + STEP / 2).div_euclid(STEP);
     let column = (nearest(x), nearest(z));
-    let offset = [x - column.0 * lattice, z - column.1 * lattice];
+    let offset = [x - column.0 * STEP, z - column.1 * STEP];
     ((column.0 as i32, column.1 as i32), offset, mean(|(from, to)| to.y - from.y))
 }

@@ -330,3 +330,38 @@ fn a_shelf_carries_presses_nothing_and_sheds_when_it_is_steep() -> Outcome {
     assert_eq!(ground.imbalance(), 0);
     Ok(())
 }
+
+/// A ball that sinks in at the edge: the columns beside it there are lowered by it, and it is beyond the edge all the same.
+#[test]
+fn a_body_that_sinks_in_beyond_the_edge_is_an_error() -> Outcome {
+    let mut ground = level(stiff(), 0.3)?;
+    let at = |x: f64, y: f64| sphere(Vector::new(x, y, 0.0), 0.1, 32);
+    let triangles = at(0.0, 0.0).1;
+    let mut failed = None;
+    for tick in 0..40 {
+        let height = |tick: i32| 0.45 - 0.005 * f64::from(tick);
+        let (from, to) = (at(0.56, height(tick)).0, at(0.56, height(tick + 1)).0);
+        if let Err(error) = ground.advance(&[], &[body(&triangles, from, to)]) {
+            failed = Some(error);
+            break;
+        }
+    }
+    assert!(matches!(&failed, Some(Error::Outside { at, .. }) if at[0] > 0.6), "{failed:?}");
+    Ok(())
+}
+
+/// More columns than the memory holds are refused before there is a list of them.
+#[test]
+fn what_is_poured_on_too_many_columns_is_an_error() -> Outcome {
+    let description = Description {
+        cell: 1e-3,
+        extent: Extent::around(1 << 15),
+        soil: Soil::sand(),
+        bed: Relief::Level(0.0),
+        depth: Relief::Level(0.3),
+    };
+    let mut ground = Ground::new(description, Settings { memory: 16, ..Settings::default() })?;
+    let pour = |radius: f64| Pour { id: 1, place: Place::Disc { centre: [1.0, 0.0], radius }, rate: 0.1 };
+    assert!(matches!(ground.advance(&[pour(30.0)], &[]), Err(Error::Memory { most: 16, at: [1.0, 0.0] })));
+    Ok(())
+}

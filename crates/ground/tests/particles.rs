@@ -158,6 +158,39 @@ fn nothing_sticks_without_a_value_for_it() -> Outcome {
     Ok(())
 }
 
+/// A ball is lifted at one speed, and then faster and faster: it keeps all, then sheds the part that its acceleration shakes off.
+#[test]
+fn what_holds_is_shed_by_acceleration() -> Outcome {
+    for (hold, exponent) in [(8.0, 1.0), (8.0, 2.0), (2.0, 3.0)] {
+        let soil =
+            Soil { stick: 0.002, shed: 0.1, hold: Some(hold), exponent, grain: Some(2e-3), ..Soil::snow() };
+        let mut ground = uneven(soil, Settings::default())?;
+        let (lift, wait, shake) = (2_u32, 12_u32, 24_u32);
+        let place = |tick: u32| -> Arc<[Vector]> {
+            let after = |first: u32| f64::from(tick.saturating_sub(first)) * TICK;
+            // From when it is shaken on with 4 m/s².
+            let up = 3.0 * after(lift) + 0.5 * 4.0 * after(wait).powi(2);
+            sphere(Vector::new(0.0, 0.13 + up, 0.0), 0.08, 24).0
+        };
+        let (_, triangles) = sphere(Vector::zeros(), 0.08, 24);
+        let mut kept = Vec::new();
+        for tick in 0..shake {
+            let still = Body::still(1, "a ball", triangles.clone(), place(tick));
+            ground.advance(&[], &[Body { to: place(tick + 1), ..still }])?;
+            kept.push(ground.sticking());
+            assert_eq!(ground.imbalance(), 0);
+        }
+        let [first, last] = [kept[lift as usize + 2], kept[wait as usize - 1]];
+        assert!(first > 1e-5 && first == last, "{kept:?}");
+        let pace = (4.0 / hold).powf(exponent).min(1.0);
+        // The first tick with an acceleration has half of it: the mean over the tick before and itself.
+        let time = f64::from(shake - wait - 1) * TICK * pace + TICK * (2.0 / hold).powf(exponent).min(1.0);
+        let part = kept[shake as usize - 1] / last;
+        assert!((part / (-time / 0.1).exp() - 1.0).abs() < 0.02, "{hold} {exponent}: {part} {time}");
+    }
+    Ok(())
+}
+
 #[test]
 fn particles_come_to_lie_on_shelves() -> Outcome {
     let mut ground = uneven(sticky(), Settings::default())?;
@@ -183,6 +216,9 @@ fn impossible_values_and_too_many_particles_are_errors() -> Outcome {
         Soil { stick: f64::NAN, ..Soil::sand() },
         Soil { shed: 0.0, ..sticky() },
         Soil { grain: Some(0.0), ..sticky() },
+        Soil { hold: Some(0.0), ..sticky() },
+        Soil { hold: Some(f64::NAN), ..sticky() },
+        Soil { exponent: 0.0, ..sticky() },
     ] {
         assert!(matches!(uneven(soil, Settings::default()), Err(Error::Value { .. })), "{soil:?}");
     }

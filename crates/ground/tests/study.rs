@@ -122,3 +122,13 @@ fn what_sticks_is_shed_along_the_exponential_and_flies_along_parabolas() -> Outc
     assert!(rows.iter().all(|row| row.error < 1e-12), "{rows:#?}");
     Ok(())
 }
+
+#[test]
+fn hard_cases_come_to_rest_and_lose_nothing() {
+    let cases = study::hard_cases();
+    assert_eq!(cases.len(), 9);
+    for case in cases {
+        assert!(case.failure.is_none() && case.imbalance == 0, "{case:?}");
+        assert!(case.sweeps > 0 && case.updates > 0, "{case:?}");
+    }
+}

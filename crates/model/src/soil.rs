@@ -35,6 +35,10 @@ pub struct Soil {
     pub stick: Option<f64>,
     /// The time constant with which bodies shed what sticks to them, in s.
     pub shed: Option<f64>,
+    /// The acceleration from which on bodies shed all that is due, in m/s², and the power with which what they shed follows a smaller one.
+    pub hold: Option<f64>,
+    /// See `hold`.
+    pub exponent: Option<f64>,
     /// The diameter of the particles that leave them, in m.
     pub grain: Option<f64>,
     /// Its colour.

@@ -31,8 +31,8 @@ pub struct Survey {
     has_camera: bool,
     /// What is seen is a profile, which turns.
     turns: bool,
-    /// There are pictures on surfaces.
-    has_pictures: bool,
+    /// There are pictures on surfaces, or ground that gives way: these are seen as they are also where plants have no depth, or nothing is drawn.
+    has_solids: bool,
     /// The surroundings of the first frame.
     first: Option<Surroundings>,
 }
@@ -52,7 +52,7 @@ impl Survey {
             follows_cameras: true,
             has_camera: false,
             turns: false,
-            has_pictures: false,
+            has_solids: false,
             first: None,
         }
     }
@@ -96,7 +96,7 @@ impl Survey {
         self.first.get_or_insert_with(|| around.clone());
         self.has_camera |= around.camera.is_some() && self.follows_cameras;
         self.seen.merge(&if self.turns { Extent::profile(scene) } else { Extent::of(scene, &self.view) });
-        self.has_pictures |= scene.palette.has_textures();
+        self.has_solids |= scene.palette.has_textures() || scene.terrain.is_some();
         self.crowd.merge(Crowd::of(scene));
     }
 
@@ -105,7 +105,7 @@ impl Survey {
         self.space.merge(&other.space);
         self.crowd.merge(other.crowd);
         self.has_camera |= other.has_camera;
-        self.has_pictures |= other.has_pictures;
+        self.has_solids |= other.has_solids;
         if self.first.is_none() {
             self.first.clone_from(&other.first);
         }
@@ -160,7 +160,7 @@ impl Survey {
             light: Light::new(depths, extent),
             meshes: (usual, self.space.corners(usual)),
             has_one_width: self.has_one_width,
-            has_regions: depths[1] - depths[0] > FLAT * extent || self.has_pictures,
+            has_regions: depths[1] - depths[0] > FLAT * extent || self.has_solids,
             declared: self.declared.clone(),
             zoom: self.zoom,
             follows_cameras: self.follows_cameras,
@@ -190,7 +190,7 @@ pub struct Fit {
     meshes: (f64, Option<[Point; 2]>),
     /// All lines have the default width.
     has_one_width: bool,
-    /// Its depth is more than rounding, or there are pictures on surfaces.
+    /// Its depth is more than rounding, or there are pictures on surfaces or ground that gives way.
     has_regions: bool,
     declared: Surroundings,
     zoom: f64,
@@ -246,7 +246,7 @@ impl Fit {
         Bounds::of(&self.drawn(Cow::Borrowed(scene))).corners(self.default_width)
     }
 
-    /// True if SVG pictures are made of visible regions: the animation has depth, or there are pictures on surfaces. Without depth nothing is hidden,
+    /// True if SVG pictures are made of visible regions: the animation has depth, or there are pictures on surfaces or ground that gives way. Without depth nothing is hidden,
     /// and every element keeps its exact shape.
     pub(super) fn has_visible_regions(&self) -> bool {
         self.has_regions

@@ -59,6 +59,28 @@ pub fn ground_rule_table() -> Result<String, ground::Error> {
     Ok(out)
 }
 
+/// The hard cases as a table.
+pub fn hard_ground_table(cases: &[ground::study::HardCase]) -> String {
+    let mut out = "ground: hard cases, until everything is at rest\n".to_owned();
+    let mut table = Table::default();
+    table.push(["", "sweeps", "column updates", "volume", "seconds", ""].map(str::to_owned));
+    for case in cases {
+        table.push([
+            case.case.to_owned(),
+            case.sweeps.to_string(),
+            case.updates.to_string(),
+            case.imbalance.to_string(),
+            brief(case.seconds, 2),
+            if case.failure.is_some() { "fails" } else { "" }.to_owned(),
+        ]);
+    }
+    table.write("  ", &mut out);
+    for (case, error) in cases.iter().filter_map(|case| Some((case.case, case.failure.as_ref()?))) {
+        out += &format!("  {case}: {error}\n");
+    }
+    out
+}
+
 /// Measures the cost of sweeps and of scenes.
 ///
 /// # Errors

@@ -13,7 +13,7 @@
 //! - `table`, `files`, `plot`: a study as text, as CSV and JSON, and as a picture; `axis`, `diagram`: parts that plots share.
 //! - `spread`, `band`: the distribution of measures over many specimens, as tables and as a plot.
 //! - `verify`: a run computed again in an independent way.
-//! - `stems`, `passive`: error of drawn positions against work for stems that bend, and for what falls and hangs; `surroundings`, `falls`, `gases`, `sheets`, `grounds`: exact cases and
+//! - `stems`, `passive`, `soils`: error against work for stems that bend, for what falls and hangs, and for ground that gives way; `surroundings`, `falls`, `gases`, `sheets`, `grounds`: exact cases and
 //!   speed of wind, stems, bodies that fall, gases, sheets and ground.
 //! - `coupling`: forces of the passive parts of a model on the active ones, and which coupling serves.
 //! - `case`, `hard`, `cases`: models with exact answers in their first lines.
@@ -41,6 +41,7 @@ mod plot;
 mod record;
 mod reference;
 mod sheets;
+mod soils;
 mod spread;
 mod stems;
 mod study;
@@ -61,7 +62,7 @@ pub use error::Error;
 pub use falls::{Contacts, Landings, exact_fall_table};
 pub use files::{csv, hard_csv, hard_json, json};
 pub use gases::{exact_gas_table, gas_speed_table};
-pub use grounds::{exact_ground_table, ground_rule_table, ground_speed_table};
+pub use grounds::{exact_ground_table, ground_rule_table, ground_speed_table, hard_ground_table};
 pub use hard::{CaseResult, HardPlan, Mismatch, run_case};
 pub use order::{nominal_order, observed_order};
 pub use passive::{PassivePoint, PassiveStudy, passive_csv, passive_study, passive_table};
@@ -71,6 +72,7 @@ pub use reference::{Reference, References};
 pub use sheets::{
     Passes, exact_sheet_table, hard_sheet_table, net_table, sheet_method_table, sheet_speed_table,
 };
+pub use soils::{SoilOutcome, SoilPoint, SoilStudy, soil_csv, soil_study, soil_table};
 pub use spread::{QUANTILES, Spread, SpreadSeries, spread_csv, spread_table};
 pub use stems::{StemOutcome, StemPoint, StemStudy, stem_csv, stem_study, stem_table};
 pub use study::{Outcome, Plan, Point, Series, Study, Wall, default_times, study};

@@ -7,7 +7,6 @@ use dlsys_sim::GroundRule;
 
 use crate::Error;
 use crate::place::Place;
-use crate::terrain::TICKS;
 
 /// Height of the soil above what does not give way, in columns, where the text gives no `depth`.
 const DEEP: f64 = 10_000.0;
@@ -19,21 +18,21 @@ pub(crate) fn from_metres(points: &[ground::Vector], metre: f64) -> Vec<Point> {
     points.iter().map(|point| Point::from(point / metre)).collect()
 }
 
-/// The ground of a model at the beginning; `None` if none is declared that gives way.
+/// The ground of a model at the beginning, with so many ticks in a second; `None` if none is declared that gives way.
 ///
 /// # Errors
 /// Values that are out of range.
 pub(crate) fn ground(
     model: &Model,
     place: &Place,
-    threads: usize,
+    (threads, ticks): (usize, f64),
     rule: GroundRule,
 ) -> Result<Option<Ground>, Error> {
     let Some(bed) = &model.scenery.bed else { return Ok(None) };
     let metre = place.units.length;
     let description = describe(bed, &model.scenery.soils[bed.soil], metre);
     let settings = ground::Settings {
-        tick: 1.0 / TICKS,
+        tick: 1.0 / ticks,
         threads: threads.clamp(1, 1024),
         memory: MEMORY,
         slides: bed.texture.is_some(),
@@ -95,6 +94,8 @@ pub fn material(soil: &Soil) -> ground::Soil {
         swell: soil.swell.unwrap_or(base.swell),
         stick: soil.stick.unwrap_or(base.stick),
         shed: soil.shed.unwrap_or(base.shed),
+        hold: soil.hold,
+        exponent: soil.exponent.unwrap_or(base.exponent),
         grain: soil.grain,
     }
 }

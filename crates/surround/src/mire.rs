@@ -68,8 +68,10 @@ impl<'m> Mire<'m> {
         if !model.reads_force() {
             return Ok(None);
         }
-        let Some(ground) = columns::ground(model, &place, 1, settings.ground_rule)? else { return Ok(None) };
-        let works = Works { model, place };
+        let Some(ground) = columns::ground(model, &place, (1, TICKS), settings.ground_rule)? else {
+            return Ok(None);
+        };
+        let works = Works { model, place, ticks: TICKS };
         let (descent, forces) = (Descent::default(), Vec::new());
         Ok(Some(Mire { works, ground, bodies: None, number: 0, descent, forces }))
     }

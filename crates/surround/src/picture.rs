@@ -42,3 +42,31 @@ impl Picture {
         mesh.under_picture(places)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Earth, Picture};
+    use crate::spray::with_spray;
+    use dlsys_geometry::scene::MaterialId;
+    use dlsys_ground::{Mesh, Vector};
+
+    /// What lies on bodies, and what flies, has the colour of the soil: a picture would stay where it is while they move.
+    #[test]
+    fn the_picture_is_on_the_surface_only() {
+        let at = |height: f64, slid: Vec<[f64; 2]>| Mesh {
+            points: [Vector::zeros(), Vector::z(), Vector::x()]
+                .map(|point| point + Vector::y() * height)
+                .into(),
+            triangles: vec![[0, 1, 2]],
+            slid,
+        };
+        let mut mesh = at(0.0, vec![[0.0; 2]; 3]);
+        mesh.append(&at(1.0, Vec::new()));
+        let earth = Earth { surface: MaterialId::LEAF, loose: MaterialId::STEM };
+        let spray = Mesh::octahedron(Vector::y() * 2.0, 1e-3);
+        let scene = with_spray(mesh, &spray, (1.0, Some(Picture { size: 1.0 })), earth);
+        let materials: Vec<_> = scene.faces.iter().map(|face| face.material).collect();
+        assert_eq!((materials.len(), materials[0]), (10, earth.surface));
+        assert!(materials[1..].iter().all(|material| *material == earth.loose));
+    }
+}

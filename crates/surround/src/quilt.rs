@@ -81,7 +81,7 @@ impl<'m> Terrain<'m> {
         Ok(Quilt { pieces, earth, particle })
     }
 
-    /// Adds the pieces at a time of the model to a scene, what lies on bodies, and each particle.
+    /// Adds the pieces at a time of the model to a scene, what lies on bodies and sticks to them, and each particle.
     ///
     /// # Errors
     /// As of [`Terrain::at`].
@@ -96,7 +96,7 @@ impl<'m> Terrain<'m> {
         let moment = self.reach(&mut state, time, motion)?;
         drop(state);
         let metre = self.works.place.units.length;
-        // What lies on bodies is the first owner, also where there is nothing.
+        // What lies on bodies and sticks to them is the first owner, also where there is nothing.
         let owner = |number: usize| {
             let lineage = Lineage::of_axiom(0).child(NO_PRODUCTION, number);
             Owner { name: NAME.into(), lineage }
@@ -112,7 +112,8 @@ impl<'m> Terrain<'m> {
             let mesh = rest.moved(from_metres(&moment.ground.points(piece), metre));
             add(number + 1, Arc::new(mesh), Some(Arc::clone(rest)));
         }
-        let heaps = moment.ground.heaps();
+        let mut heaps = moment.ground.heaps();
+        heaps.append(&moment.ground.clods());
         if !heaps.triangles.is_empty() {
             let none = ground::Mesh::default();
             add(0, Arc::new(with_spray(heaps, &none, (metre, None), quilt.earth.loose.into())), None);

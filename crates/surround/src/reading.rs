@@ -44,7 +44,7 @@ pub(crate) fn layers(model: &Model) -> Result<Option<Arc<Layers>>, Error> {
         return Ok(None);
     }
     let place = Place::of_scene(&model.scenery);
-    let Some(ground) = columns::ground(model, &place, 1, GroundRule::Law)? else { return Ok(None) };
+    let Some(ground) = columns::ground(model, &place, (1, TICKS), GroundRule::Law)? else { return Ok(None) };
     let tick = 1.0 / (TICKS * place.units.time);
     model.scenery.layers.get_or_make(|| Ok(Arc::new(Layers::new(ground, (place.units.length, tick)))))
 }

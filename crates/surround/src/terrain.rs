@@ -127,13 +127,26 @@ impl<'m> Terrain<'m> {
     /// # Errors
     /// A ground whose values are out of range.
     pub fn new(model: &'m Model, settings: Settings, threads: usize) -> Result<Option<Terrain<'m>>, Error> {
+        Terrain::with_ticks(model, settings, (threads, TICKS))
+    }
+
+    /// As [`Terrain::new`], with another number of ticks in a second, for studies of the error. Rules that read the ground always read it as it is with [`TICKS`].
+    ///
+    /// # Errors
+    /// As of [`Terrain::new`].
+    pub fn with_ticks(
+        model: &'m Model,
+        settings: Settings,
+        (threads, ticks): (usize, f64),
+    ) -> Result<Option<Terrain<'m>>, Error> {
         let place = Place::of_scene(&model.scenery);
         reading::bind(model)?;
-        let Some(ground) = columns::ground(model, &place, threads, settings.ground_rule)? else {
+        let layers = reading::layers(model)?;
+        let ticks = if layers.is_some() { TICKS } else { ticks };
+        let Some(ground) = columns::ground(model, &place, (threads, ticks), settings.ground_rule)? else {
             return Ok(None);
         };
         let settings = Settings { log: true, transitions: false, ..settings };
-        let layers = reading::layers(model)?;
         let growth = match layers.is_some() {
             // It reads what is computed here.
             true => Simulation::new(model, settings)?,
@@ -154,7 +167,7 @@ impl<'m> Terrain<'m> {
         };
         let has_bodies = !model.scenery.solids.is_empty() || !model.scenery.shelves.is_empty();
         let picture = model.scenery.bed.as_ref().and_then(|bed| Picture::of(bed, place.units.length));
-        let works = Works { model, place };
+        let works = Works { model, place, ticks };
         Ok(Some(Terrain { settings, works, has_bodies, picture, layers, state: Mutex::new(state) }))
     }
 
@@ -194,6 +207,20 @@ impl<'m> Terrain<'m> {
         Ok(moment.ground.height(x * metre, z * metre) / metre)
     }
 
+    /// The rectangle around what has moved up to a time of the model, by a hundredth of a column or more: its least and its greatest x and z.
+    ///
+    /// # Errors
+    /// As of [`Terrain::at`].
+    pub fn moved(&self, time: f64, motion: Option<&Motion<'m>>) -> Result<Option<[[f64; 2]; 2]>, Error> {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let ground = self.reach(&mut state, time, motion)?.ground;
+        let scale = ground.cell() / self.works.place.units.length;
+        let around = ground.moved(0.01 * ground.cell());
+        Ok(around.map(|ground::Extent { x, z }| {
+            [0, 1].map(|end| [x[end], z[end]].map(|at| f64::from(at) * scale))
+        }))
+    }
+
     /// Counts and volumes at a time of the model.
     ///
     /// # Errors
@@ -222,7 +249,7 @@ impl<'m> Terrain<'m> {
         time: f64,
         motion: Option<&Motion<'m>>,
     ) -> Result<Moment, Error> {
-        let number = (self.works.place.seconds(time).max(0.0) * TICKS + SLACK).floor();
+        let number = (self.works.place.seconds(time).max(0.0) * self.works.ticks + SLACK).floor();
         self.reach_tick(state, number, motion)
     }
 
@@ -268,7 +295,8 @@ impl<'m> Terrain<'m> {
         // Stems that bend have a growth of their own, which reads the ground that is computed here.
         let motion = motion.filter(|_| self.layers.is_none());
         if number > MOST_TICKS {
-            let (seconds, time) = (self.works.place.units.time, self.works.place.time_at(number / TICKS));
+            let (seconds, time) =
+                (self.works.place.units.time, self.works.place.time_at(number / self.works.ticks));
             return Err(Error::TooLong { most: MOST_TICKS, time, seconds, span: self.works.span() });
         }
         let begun = Instant::now();
@@ -439,7 +467,7 @@ impl<'m> Terrain<'m> {
 
     /// The time of the model at a tick, and up to the next one.
     fn span_of(&self, number: u64) -> (f64, f64) {
-        (self.works.time_of(number), 1.0 / (TICKS * self.works.place.units.time))
+        (self.works.time_of(number), 1.0 / (self.works.ticks * self.works.place.units.time))
     }
 
     /// The surface, and what is in the air at a time in s, in units of the model.
@@ -447,6 +475,7 @@ impl<'m> Terrain<'m> {
         let metre = self.works.place.units.length;
         let mut surface = ground.mesh();
         surface.append(&ground.heaps());
+        surface.append(&ground.clods());
         with_spray(surface, &ground.spray(seconds), (metre, self.picture), earth)
     }
 }

@@ -23,6 +23,8 @@ const ACCURACY: f64 = 0.1;
 pub(crate) struct Works<'m> {
     pub(crate) model: &'m Model,
     pub(crate) place: Place,
+    /// Ticks in a second.
+    pub(crate) ticks: f64,
 }
 
 impl<'m> Works<'m> {
@@ -50,7 +52,7 @@ impl<'m> Works<'m> {
     /// What is poured up to a tick, at the rates and places of the middle of its time.
     pub(crate) fn pours(&self, next: u64) -> Result<Vec<ground::Pour>, Error> {
         let metre = self.place.units.length;
-        let time = self.place.time_at((next as f64 - 0.5) / TICKS);
+        let time = self.place.time_at((next as f64 - 0.5) / self.ticks);
         let mut pours = Vec::new();
         for (number, pour) in self.model.scenery.pours.iter().enumerate() {
             let rate = pour.rate.eval_one(&[time]) / self.place.units.time;
@@ -80,7 +82,7 @@ impl<'m> Works<'m> {
 
     /// The time of the model at a tick.
     pub(crate) fn time_of(&self, number: u64) -> f64 {
-        self.place.time_at(number as f64 / TICKS)
+        self.place.time_at(number as f64 / self.ticks)
     }
 
     /// The declaration of the ground.

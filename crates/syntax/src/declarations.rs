@@ -413,6 +413,8 @@ pub static DECLARATIONS: [Declaration; 35] = [
             option("swell", Follow::Value),
             option("stick", Follow::Value),
             option("shed", Follow::Value),
+            option("hold", Follow::Value),
+            option("exponent", Follow::Value),
             option("grain", Follow::Value),
             option("color", Follow::Text),
         ],

@@ -25,8 +25,14 @@ pub fn part(model: &Model) -> Option<ScenePart> {
     let soil = &scenery.soils[bed.soil];
     if let Some(stick) = soil.stick.filter(|stick| *stick > 0.0 && !solids.is_empty()) {
         let shed = soil.shed.map_or(String::new(), |shed| format!(" within {} s", brief(shed, 3)));
+        let hold = soil.hold.map_or(String::new(), |hold| {
+            format!(
+                " where they are accelerated by {} m/s² or more, and less of it elsewhere",
+                brief(hold, 3)
+            )
+        });
         reasons.push(format!(
-            "they take up {} mm of it where they touch it, and shed it as particles{shed}",
+            "they take up {} mm of it where they touch it, and shed it as particles{shed}{hold}",
             brief(1000.0 * stick, 3)
         ));
     }

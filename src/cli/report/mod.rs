@@ -111,6 +111,7 @@ fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure
     })?;
     stems(args, session, name, &plan)?;
     passive(args, session, name, &plan)?;
+    soils(args, session, name, &plan)?;
     print("\n")?;
     let Some(out) = &args.out else { return Ok(()) };
     write(out, &format!("{name}.csv"), &study::csv(&study))?;
@@ -162,6 +163,31 @@ fn passive(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Res
     }
 }
 
+/// Studies the sizes of columns and of ticks on a scene with ground that gives way.
+fn soils(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Result<(), Failure> {
+    let mut progress = Progress::new("ground", 9);
+    let study = study::soil_study(session, &plan.times, plan.base, plan.time_limit, &mut |what| {
+        progress.say(format!("{name}: ground with {what}"));
+        progress.inc();
+    });
+    drop(progress);
+    let study = match study {
+        Ok(Some(study)) => study,
+        Ok(None) => return Ok(()),
+        // Growth has been studied all the same.
+        Err(why) => {
+            return print(&format!(
+                "\nground: it does not come to the last time\n  {why}\n  (`--time-limit S` gives each run more time, `--at` fewer)\n"
+            ));
+        }
+    };
+    print(&study::soil_table(&study))?;
+    match &args.out {
+        Some(out) => write(out, &format!("{name}-ground.csv"), &study::soil_csv(&study)),
+        None => Ok(()),
+    }
+}
+
 /// Seeds over which statistics of the wind are averaged.
 const SEEDS: u64 = 32;
 /// Segments of the longest chain among the hard cases.
@@ -176,7 +202,7 @@ const PASSES: u64 = 100;
 /// Exact cases, hard cases and speed of wind, stems, bodies that fall, gases, sheets and ground. Each table is printed when it is complete.
 fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     let defect = |error: String| Failure::Model(format!("error: {error}\n"));
-    let mut progress = Progress::of_printed("surroundings", 19);
+    let mut progress = Progress::of_printed("surroundings", 20);
     let mut show = |table: String| {
         progress.inc();
         progress.suspend(|| print(&format!("{table}\n")))
@@ -223,6 +249,8 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
         grounds.extend(case().map_err(|error| defect(error.to_string()))?);
     }
     show(study::exact_ground_table(&grounds))?;
+    let buried = crate::ground::study::hard_cases();
+    show(study::hard_ground_table(&buried))?;
     show(study::ground_rule_table().map_err(|error| defect(error.to_string()))?)?;
     let wind = crate::wind::study::statistics(SEEDS).map_err(|error| defect(error.to_string()))?;
     show(study::wind_table(&wind))?;
@@ -251,6 +279,7 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
     let failed = hard.iter().filter(|case| case.failure.is_some()).count()
         + random.iter().filter(|case| case.failure.is_some()).count()
         + driven.iter().filter(|case| case.failure.is_some()).count()
+        + buried.iter().filter(|case| case.failure.is_some()).count()
         + landings.failed()
         + contacts.failed()
         + passes.failed();
@@ -259,7 +288,7 @@ fn surroundings(args: &ReportArgs) -> Result<(), Failure> {
         _ => Err(Failure::Model(format!(
             "error: {} out of bounds, {} failed\n",
             count_of(bad, "statistic"),
-            count_of(failed, "case of stems, falls and sheets")
+            count_of(failed, "case of stems, falls, sheets and ground")
         ))),
     }
 }

@@ -5,6 +5,7 @@ use dlsys_wind::study::Convergence;
 use crate::{Description, Error, Extent, Ground, Relief, Rule, Settings, Soil};
 
 mod banks;
+mod hard;
 mod heaps;
 mod presses;
 mod rules;
@@ -16,6 +17,7 @@ mod throws;
 mod vessels;
 
 pub use banks::{Bank, bank};
+pub use hard::{HardCase, hard_cases};
 pub use heaps::{cone, cone_on_incline, cylinder, dam, portions, round, strip};
 pub use presses::{ball, sphere, sphere_rim};
 pub use rules::{RuleRow, repose, rules};

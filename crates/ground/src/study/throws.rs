@@ -5,6 +5,7 @@ use std::sync::Arc;
 use dlsys_wind::study::Convergence;
 
 use super::sphere;
+use crate::barrier::Barriers;
 use crate::particles::Particle;
 use crate::{Body, Description, Error, Extent, Ground, Relief, Settings, Soil, Vector};
 
@@ -72,7 +73,8 @@ pub fn flight() -> Result<Vec<Convergence>, Error> {
         };
         let mut ground = Ground::new(description, Settings::default())?;
         let end = Settings::default().tick;
-        ground.throw(Particle { id: 1, born: 0.0, place, velocity, volume: 1 << 20 }, end)?;
+        let thrown = Particle { id: 1, born: 0.0, place, velocity, volume: 1 << 20 };
+        ground.throw(thrown, end, &Barriers::default())?;
         let mut far = 0.0;
         while let Some(flight) = ground.flights(ground.time() + end).first() {
             far = flight.place.x - place.x;
