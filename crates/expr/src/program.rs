@@ -85,14 +85,17 @@ fn each<const PARTS: usize>(registers: &mut [Lanes], [to, a, b]: [Register; 3], 
 
 /// The same for operations that take so long that all else counts little.
 #[inline(never)]
+#[expect(clippy::needless_range_loop, reason = "the rows of three registers, two of which may be one")]
 fn each_of(
     registers: &mut [Lanes],
     rows: usize,
     [to, a, b]: [Register; 3],
     f: &mut dyn FnMut(f64, f64) -> f64,
 ) {
-    for i in 0..rows {
-        registers[to as usize][i] = f(registers[a as usize][i], registers[b as usize][i]);
+    let [to, a, b] = [to, a, b].map(|register| register as usize);
+    for row in 0..rows {
+        let value = f(registers[a][row], registers[b][row]);
+        registers[to][row] = value;
     }
 }
 

@@ -45,12 +45,12 @@ fn rows_are_what_each_is_alone() {
         let program = Program::compile(&graph, &[node], 2);
         for rows in [1, 7, 8, 9, 16, 17, LANES] {
             let mut registers = vec![[f64::NAN; LANES]; 2];
-            for row in 0..rows {
-                [registers[0][row], registers[1][row]] = at(row);
+            for (register, variable) in registers.iter_mut().zip([0, 1]) {
+                register.iter_mut().take(rows).enumerate().for_each(|(row, x)| *x = at(row)[variable]);
             }
             let output = program.eval_rows(&mut registers, rows).next().expect("one root");
-            for row in 0..rows {
-                let (together, alone) = (registers[output][row], program.eval_one(&at(row)));
+            for (row, together) in registers[output].into_iter().enumerate().take(rows) {
+                let alone = program.eval_one(&at(row));
                 let same = together.to_bits() == alone.to_bits() || together.is_nan() && alone.is_nan();
                 assert!(same, "{name}, row {row} of {rows}: {together}, not {alone}");
             }

@@ -97,6 +97,9 @@ impl Line {
     }
 }
 
+/// A triangle of a prism: the lines along which it is gone around, and whether along or against them; and its points.
+type Face = ([(usize, bool); 3], [usize; 3]);
+
 /// A triangle on its way.
 struct Prism {
     number: u32,
@@ -104,8 +107,8 @@ struct Prism {
     heights: [i64; 6],
     /// The lines of [`EDGES`], and the diagonals of the sides.
     lines: [Line; 12],
-    /// The triangles around it: the lines along which they are gone around, and whether along or against them; and the points.
-    faces: [([(usize, bool); 3], [usize; 3]); 8],
+    /// The triangles around it.
+    faces: [Face; 8],
     first: [i32; 2],
 }
 

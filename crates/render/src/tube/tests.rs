@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use crate::triangles::{Triangles, triangles};
+use crate::triangles::{Solid, Triangles};
 use crate::{Survey, View};
 use dlsys_geometry::scene::{MaterialId, Owner, Point, Scene, Segment, Vector, Width};
 use dlsys_tree::Lineage;
@@ -56,7 +56,7 @@ fn tree(pieces: usize) -> Scene {
 fn mesh(scene: &Scene, accuracy: f64) -> Triangles {
     let mut survey = Survey::new(View::FRONT);
     survey.add(scene);
-    triangles(scene, &survey.fit().with_accuracy(accuracy), 0, |_| true)
+    Triangles::of(&Solid::new(scene, &survey.fit().with_accuracy(accuracy), 0), |_| true)
 }
 
 /// Volume, and whether every edge is passed once in each direction.
