@@ -336,7 +336,8 @@ fn one_picture_is_a_file() {
         ("thesis.png", &["--at", "1"], "is not a PNG file"),
         ("a.obj", &["--at", "1"], "-o names a folder"),
     ] {
-        let command = [&["render", "models/leaf.dls", "-o", &at(out)][..], flags].concat();
+        let out = at(out);
+        let command = [&["render", "models/leaf.dls", "-o", &out][..], flags].concat();
         assert!(bad(&command).1.contains(expected), "{out}: {}", bad(&command).1);
     }
     assert_eq!(std::fs::read(at("thesis.png")).expect("a file"), b"years of work");

@@ -294,7 +294,12 @@ impl EventStage<'_, '_> {
                 {
                     // A difference that never changes may be beyond the boundary as well.
                     let moves = !matches!(solve.zero_crossings[atom], ZeroCrossing::Constant);
-                    let sign = if moves && meet(atom) { Sign::Zero } else { missing.signs[atom] };
+                    let sign = match missing.signs[atom] {
+                        Sign::Undefined => Sign::Undefined,
+                        _ if !moves => Sign::Any,
+                        _ if meet(atom) => Sign::Zero,
+                        sign => sign,
+                    };
                     let remedy = Remedy::new(&self.setup.model.kinds, rule, atom, comparison, sign);
                     failing.push((rule.atoms[atom], remedy));
                 }
