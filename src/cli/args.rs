@@ -93,6 +93,18 @@ pub enum Action {
     Repl(ReplArgs),
 }
 
+impl Action {
+    /// Fills in what follows from several flags.
+    pub fn complete(&mut self) {
+        if let Action::Render(args) = self {
+            args.format = (args.chosen_format)
+                .or_else(|| super::render::one_picture::format_of(&args.out))
+                .unwrap_or_default();
+            args.shared.rate = super::render::pace::of(args);
+        }
+    }
+}
+
 /// A string, a distribution, a file that other programs play.
 const RUN_EXAMPLES: &str = "\
 Examples:

@@ -427,6 +427,13 @@ impl ModelRun {
     }
 }
 
+/// The time between observed times: that of `--step`, of the rate of a film, or of the model.
+pub fn step(args: &SharedArgs, session: &Session) -> Option<f64> {
+    let units = session.model.scenery.units.time;
+    let of_rate = args.rate.map(|rate| rate.speed.unwrap_or(1.0 / units) / rate.frames);
+    args.step.or(of_rate).or(session.model.frames.map(|own| own.step))
+}
+
 /// The observed times, in ascending order without duplicates.
 pub fn times(args: &SharedArgs, session: &Session) -> Result<Vec<f64>, Failure> {
     if let Some(at) = &args.at {
@@ -437,11 +444,8 @@ pub fn times(args: &SharedArgs, session: &Session) -> Result<Vec<f64>, Failure> 
     }
     let own = session.model.frames;
     // The model gives the values that the flags leave out.
-    let (from, to, step) = (
-        args.from.or(own.map(|own| own.from)),
-        args.to.or(own.map(|own| own.to)),
-        args.step.or(own.map(|own| own.step)),
-    );
+    let (from, to, step) =
+        (args.from.or(own.map(|own| own.from)), args.to.or(own.map(|own| own.to)), step(args, session));
     let (Some(from), Some(to), Some(step)) = (from, to, step) else {
         return Err(Failure::Usage(
             "error: the model has no `frames`: say when to look with `--at T1,T2,…` or `--from A --to B --step S`\n"

@@ -22,7 +22,7 @@ pub fn run(session: &Session, words: &[String]) -> Result<(), Failure> {
     // A name that begins with a dash must not look like a flag.
     line.push(format!("./{}", session.source.name).replace(".//", "/"));
     line.extend(words.iter().skip(1).cloned());
-    let command = match Command::try_parse_from(&line) {
+    let mut command = match Command::try_parse_from(&line) {
         Ok(command) => command,
         Err(error) => {
             return match error.use_stderr() {
@@ -31,6 +31,7 @@ pub fn run(session: &Session, words: &[String]) -> Result<(), Failure> {
             };
         }
     };
+    command.action.complete();
     match &command.action {
         Action::Render(args) => {
             render::render_run(args, ModelRun::of(session.clone(), &args.shared)?, &|| false)

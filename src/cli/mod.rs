@@ -49,7 +49,7 @@ fn command_line() -> u8 {
     if std::env::var_os("DLSYS_PANIC").is_some_and(|what| what == "at once") {
         panic!("asked for");
     }
-    let command = match Command::try_parse() {
+    let mut command = match Command::try_parse() {
         Ok(command) => command,
         Err(error) => {
             // Help and version are answers, not errors; clap knows which stream they belong on.
@@ -63,6 +63,7 @@ fn command_line() -> u8 {
     if command.progress {
         progress::ask();
     }
+    command.action.complete();
     let done = match &command.action {
         Action::New(args) => new::new(args),
         Action::Fmt(args) => fmt::fmt(args),

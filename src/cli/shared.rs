@@ -103,6 +103,13 @@ impl SolverArgs {
     }
 }
 
+/// How fast a film is: frames in a second, and units of the model's time, if that is given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rate {
+    pub frames: f64,
+    pub speed: Option<f64>,
+}
+
 /// Flags of everything that runs a model.
 #[derive(Debug, Args)]
 pub struct SharedArgs {
@@ -120,6 +127,9 @@ pub struct SharedArgs {
     /// Time between them
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub step: Option<f64>,
+    /// What says the time between them if `step` does not.
+    #[arg(skip)]
+    pub rate: Option<Rate>,
     /// Set a `param` of the model; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     pub settings: Vec<Setting>,

@@ -29,6 +29,27 @@ pub enum RenderFormat {
     Moving,
 }
 
+impl Default for RenderFormat {
+    fn default() -> RenderFormat {
+        RenderFormat::Frames(Format::SVG)
+    }
+}
+
+impl RenderFormat {
+    /// The format of this name, which is also the ending of its files.
+    pub(super) fn named(name: &str) -> Option<RenderFormat> {
+        match name {
+            ANIMATED_SVG => Some(RenderFormat::Moving),
+            "glb" => Some(RenderFormat::Growth(interchange::Format::Glb)),
+            "usda" => Some(RenderFormat::Growth(interchange::Format::Usda)),
+            name => match film::Format::ALL.into_iter().find(|film| film.extension() == name) {
+                Some(film) => Some(RenderFormat::Film(film)),
+                None => name.parse::<Format>().ok().map(RenderFormat::Frames),
+            },
+        }
+    }
+}
+
 /// The name of the format of one SVG document that plays by itself.
 pub const ANIMATED_SVG: &str = "asvg";
 
@@ -41,17 +62,8 @@ pub(super) fn render_format() -> impl TypedValueParser<Value = RenderFormat> {
     let films = film::Format::ALL.map(|film| PossibleValue::new(film.extension()).help(film.about()));
     let moving = PossibleValue::new(ANIMATED_SVG)
         .help("A film in one file: animated SVG, sharp at any size; browsers play it in <img>");
-    PossibleValuesParser::new(frames.chain([glb, usda]).chain(films).chain([moving])).try_map(|name| {
-        match &*name {
-            ANIMATED_SVG => Ok(RenderFormat::Moving),
-            "glb" => Ok(RenderFormat::Growth(interchange::Format::Glb)),
-            "usda" => Ok(RenderFormat::Growth(interchange::Format::Usda)),
-            name => match film::Format::ALL.into_iter().find(|film| film.extension() == name) {
-                Some(film) => Ok(RenderFormat::Film(film)),
-                None => name.parse::<Format>().map(RenderFormat::Frames),
-            },
-        }
-    })
+    PossibleValuesParser::new(frames.chain([glb, usda]).chain(films).chain([moving]))
+        .try_map(|name| RenderFormat::named(&name).ok_or("no format"))
 }
 
 pub(super) fn number(text: &str) -> Result<f64, String> {

@@ -162,7 +162,7 @@ fn flags_that_make_no_film_are_refused_and_files_of_others_stay() {
     let thesis = folder.path().join("thesis.gif");
     fs::write(&thesis, "years of work").expect("written");
     let thesis = thesis.to_str().expect("UTF-8");
-    let cases: [(&[&str], &str); 18] = [
+    let cases: [(&[&str], &str); 21] = [
         (&["gif", "-o", thesis], "is not a GIF file"),
         (&["gif", "-o", "a.gif", "--background", "none"], "no transparency"),
         (&["webp", "-o", "a.gif"], "`-o a.webp`"),
@@ -183,6 +183,9 @@ fn flags_that_make_no_film_are_refused_and_files_of_others_stay() {
         (&["usda", "-o", "a.usda", "--shutter", "0.5"], "--shutter does not go with --format usda"),
         (&["png", "-o", "a", "--shutter", "0.5", "--layout", "stack"], "--shutter does not go with"),
         (&["png", "-o", "a", "--shutter", "180"], "180 degrees of 360 are 0.5 of a frame, or `180deg`"),
+        (&["png", "-o", "a", "--fps", "25"], "--fps is for films in one file"),
+        (&["glb", "-o", "a.glb", "--fps", "25"], "has a rate of its own"),
+        (&["webp", "-o", "a.webp", "--fps", "25", "--speed", "2"], "leave one of the two out"),
         (&["png", "-o", "a", "--shutter", "1.5"], "from 0 to 1 frame, or from 0deg to 360deg"),
     ];
     for (arguments, expected) in cases {
@@ -197,4 +200,32 @@ fn flags_that_make_no_film_are_refused_and_files_of_others_stay() {
     .concat());
     assert!(message.contains("larger than"), "{message}");
     assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1, "nothing is left over");
+}
+
+#[test]
+fn of_rate_step_and_speed_two_say_the_third() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let film = |name: &str, flags: &[&str]| {
+        let file = folder.path().join(name).with_extension("webp");
+        let out = file.to_str().expect("UTF-8");
+        let all = ["render", "models/leaf.dls", "--format", "webp", "--size", "40x30", "-o", out];
+        let said = good(&[&all[..], flags].concat());
+        (said, reader::read(&fs::read(&file).expect("a file")).1)
+    };
+    let from_to = ["--from", "0", "--to", "2"];
+    let (said, milliseconds) = film("slides", &[&from_to[..], &["--step", "0.5"]].concat());
+    assert_eq!(milliseconds, [500; 5]);
+    assert!(said.contains("2 a second, 2.50 s to play") && said.contains("`--fps 25`"), "{said}");
+    let (said, milliseconds) = film("fps", &[&from_to[..], &["--fps", "16"]].concat());
+    assert_eq!(milliseconds.len(), 33, "2 units of t last 2 seconds");
+    assert!(said.contains("16 a second") && !said.contains("slides"), "{said}");
+    let (_, milliseconds) = film("speed", &[&from_to[..], &["--fps", "8", "--speed", "4"]].concat());
+    assert_eq!(milliseconds, [125; 5]);
+    let (_, milliseconds) = film("step", &[&from_to[..], &["--fps", "20", "--step", "0.5"]].concat());
+    assert_eq!(milliseconds, [50; 5]);
+    let (_, milliseconds) = film("at", &["--at", "0,1,5", "--fps", "20"]);
+    assert_eq!(milliseconds, [50; 3]);
+    let (_, milliseconds) =
+        film("orbit", &["--at", "5", "--orbit", "90", "--orbit-frames", "4", "--fps", "20"]);
+    assert_eq!(milliseconds, [50; 4]);
 }

@@ -311,3 +311,36 @@ fn lines_have_the_width_that_was_asked_for_in_pixels_and_in_units() {
         ["0.02", "0.08"].map(|units| values(&drawn("units", &["--line-width", units]), "stroke-width")[0]);
     assert!((wide / narrow - 4.0).abs() < 0.1, "{narrow} {wide}");
 }
+
+/// The ending of the file chooses the format; one picture is a file of that name.
+#[test]
+fn one_picture_is_a_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let render = |out: &str, flags: &[&str]| {
+        good(&[&["render", "models/leaf.dls", "--width", "60", "-o", &at(out)][..], flags].concat())
+    };
+    let begins = |name: &str, start: &[u8]| std::fs::read(at(name)).expect("a file").starts_with(start);
+    let said = render("a.png", &["--at", "3"]);
+    assert!(begins("a.png", b"\x89PNG") && said.contains("a.png"), "{said}");
+    render("frames", &["--at", "3", "--format", "png"]);
+    let frame = std::fs::read(at("frames/frame-0000.png")).expect("a frame");
+    assert!(frame == std::fs::read(at("a.png")).expect("a file"), "the same picture");
+    render("a.svg", &["--at", "3"]);
+    render("grid.svg", &["--at", "1,3", "--layout", "grid"]);
+    render("a.gif", &["--at", "1,3"]);
+    assert!(begins("a.svg", b"<svg") && begins("grid.svg", b"<svg") && begins("a.gif", b"GIF"));
+    std::fs::write(at("thesis.png"), "years of work").expect("written");
+    for (out, flags, expected) in [
+        ("many.png", &["--at", "1,3"][..], "`--at T` for one frame in a file"),
+        ("thesis.png", &["--at", "1"], "is not a PNG file"),
+        ("a.obj", &["--at", "1"], "-o names a folder"),
+    ] {
+        let out = at(out);
+        let command = [&["render", "models/leaf.dls", "-o", &out][..], flags].concat();
+        assert!(bad(&command).1.contains(expected), "{out}: {}", bad(&command).1);
+    }
+    assert_eq!(std::fs::read(at("thesis.png")).expect("a file"), b"years of work");
+    let count = std::fs::read_dir(folder.path()).expect("a folder").count();
+    assert_eq!(count, 6, "nothing is left over");
+}

@@ -4,10 +4,13 @@ use std::sync::Arc;
 
 use crate::cli::{bad, good};
 use crate::common::scene;
-use dlsys::render::{Fit, Format, FrameWriter, Page, Size, Smoothness, Survey, View, pixels_by};
+use dlsys::render::{
+    Fit, Format, FrameWriter, Layout, Page, Sheet, SheetWriter, Size, Smoothness, Spacing, Survey, View,
+    pixels_by,
+};
 use dlsys::scene::{
-    Bounds, Color, MaterialId, Owner, Placement, Plant, Point, Polygon, Scene, Surroundings, Vector,
-    Viewpoint,
+    Bounds, Color, Face, MaterialId, Mesh, Owner, Placement, Plant, Point, Polygon, Scene, Surroundings,
+    Vector, Viewpoint,
 };
 use dlsys::tree::Lineage;
 
@@ -52,6 +55,41 @@ fn the_shadow_of_a_pole_lies_on_the_side_away_from_the_sun_and_is_as_long_as_it_
         }
     }
     assert!(floor(-4.3, 0.0) > 0.9 * lit, "beyond the shadow's end");
+}
+
+/// Ground of soil that reaches a hundred times as far does not make the shadow of what stands on it wider.
+#[test]
+fn shadows_on_wide_soil_are_as_sharp_as_on_a_floor() {
+    let mut scene = pole();
+    scene.surroundings.floor = None;
+    let mut mesh = Mesh::new();
+    mesh.vertices = [[-400.0, -400.0], [-400.0, 400.0], [400.0, 400.0], [400.0, -400.0]]
+        .map(|[x, z]| Point::new(x, 0.0, z))
+        .to_vec();
+    mesh.normals = vec![Vector::y(); 4];
+    let face = |corners| Face { corners, material: MaterialId::CENTRE, takes_tint: false };
+    mesh.faces = vec![face([0, 1, 2]), face([0, 2, 3])];
+    scene.add_terrain(Arc::new(mesh));
+    let soil = |x: f64, z: f64| seen_at(&scene, "0,50", Point::new(x, 0.0, z))[1];
+    let lit = soil(2.0, 0.0);
+    for x in [-1.0, -2.0, -3.0] {
+        assert!(soil(x, 0.0) < 0.8 * lit, "in shadow at {x}");
+        assert!([-0.25, 0.25].map(|z| soil(x, z)).iter().all(|beside| *beside > 0.9 * lit), "lit beside it");
+    }
+    // The sky is seen less near the foot, and as far from the pole as anywhere.
+    assert!(soil(0.2, 0.0) < 0.97 * lit && (soil(3.5, 2.0) - lit).abs() < 0.03 * lit);
+}
+
+#[test]
+fn a_floor_has_the_declared_color() {
+    let mut scene = pole();
+    scene.surroundings.floor_color = Some(Color::hex(0x7f9a4e));
+    for sky in [None, Some([Color::hex(0x6fa3e0), Color::hex(0xe8f0f8)])] {
+        scene.surroundings.sky = sky;
+        let [red, green, blue] = seen_at(&scene, "0,50", Point::new(2.0, 0.0, 0.0));
+        let far = [red - 127.0, green - 154.0, blue - 78.0].map(f64::abs).into_iter().fold(0.0, f64::max);
+        assert!(far < 12.0, "{red} {green} {blue}");
+    }
 }
 
 #[test]
@@ -129,6 +167,21 @@ fn a_floor_is_a_group_of_a_mesh_and_regions_of_a_drawing_and_does_not_change_the
     let svg = write(Format::SVG);
     let ground = svg.split("<g id=\"ground\">").nth(1).and_then(|rest| rest.split("</g>").next());
     assert!(ground.is_some_and(|ground| ground.lines().count() > 3), "lit and in shadow");
+}
+
+#[test]
+fn a_floor_fills_pages_of_any_shape() {
+    let scene = pole();
+    for size in [[900, 200], [200, 900]] {
+        let mut writer = FrameWriter::new(Format::SVG, fit(&scene, "20,60"));
+        writer.page = Page::new(writer.page.picture, Size::Exact(size[0], size[1]), writer.page.background)
+            .expect("small");
+        let svg = String::from_utf8(writer.write(&scene, "")).expect("UTF-8");
+        let tree = usvg::Tree::from_str(&svg, &usvg::Options::default()).expect("an SVG");
+        let ground = tree.node_by_id("ground").expect("a floor").abs_bounding_box();
+        let [width, height] = size.map(|side| side as f32);
+        assert!(ground.width() > 0.99 * width && ground.height() > 0.99 * height, "{size:?}: {ground:?}");
+    }
 }
 
 #[test]
@@ -276,4 +329,37 @@ fn the_sky_is_behind_everything() {
     let has = |text: &str| assert!(svg.contains(text), "{text}: {}", &svg[..600.min(svg.len())]);
     has("fill=\"url(#sky)\"");
     has("stop-color=\"#0000ff\"");
+}
+
+/// Frames of a grid stand on one floor, each with its whole shadow: at the rims of the frames there is nothing to be seen.
+#[test]
+fn frames_of_a_grid_stand_on_one_floor() {
+    let mut scene = pole();
+    scene.surroundings.sky = Some([Color::hex(0x6fa3e0), Color::hex(0xe8f0f8)]);
+    scene.surroundings.floor_color = Some(Color::hex(0x7f9a4e));
+    let mut survey = Survey::new("0,30".parse().expect("a view"));
+    survey.add(&scene);
+    let fit = survey.fit();
+    let sheet = Sheet::new(Layout::Grid, &fit, &[survey.clone(), survey], &[], Spacing::default());
+    let page = Page::new(sheet.picture, Size::Larger(600), Some(Page::BACKGROUND)).expect("small");
+    let writer = SheetWriter::new(Format::PNG, fit, sheet, page).expect("a picture");
+    let mut assembly = writer.begin();
+    (0..2).for_each(|frame| assembly.add(writer.part(frame, &scene)).expect("short"));
+    let file = assembly.finish("poles");
+    let mut reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().expect("PNG");
+    let mut data = vec![0; reader.output_buffer_size().expect("small")];
+    reader.next_frame(&mut data).expect("a picture");
+    let width = writer.page().pixels[0] as usize;
+    let green: Vec<i32> = data.chunks_exact(3).map(|rgb| i32::from(rgb[1])).collect();
+    let rows: Vec<&[i32]> = green.chunks_exact(width).collect();
+    assert!(rows[0].iter().chain(rows[rows.len() - 1]).all(|green| (green - 154).abs() <= 1), "one floor");
+    // What is darker than that changes slowly, but for the shadow's own edge and the pole, in both halves alike.
+    let dark = |columns: std::ops::Range<usize>| {
+        rows.iter().flat_map(|row| &row[columns.clone()]).filter(|green| **green < 130).count()
+    };
+    let (left, right) = (dark(0..width / 2), dark(width / 2..width));
+    assert!(left > 500 && left.abs_diff(right) < left / 20, "{left} {right}");
+    let edges = |row: &&&[i32]| row.windows(2).filter(|pair| (pair[0] - pair[1]).abs() > 8).count();
+    let most = rows.iter().map(|row| edges(&row)).max().unwrap_or_default();
+    assert!(most <= 24, "{most} edges in a row");
 }

@@ -7,8 +7,8 @@ use crate::scope::Scope;
 use crate::surface;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
-    Appearance, BUILT_IN_COLORS, COMMAND_SURFACES, Contour, Gradient, NamedColor, Picture, Rgb, SurfaceShape,
-    Texture, Tropism,
+    Appearance, BUILT_IN_COLORS, BUILT_IN_SURFACES, COMMAND_SURFACES, Contour, Gradient, NamedColor, Picture,
+    Rgb, SurfaceShape, Texture, Tropism,
 };
 use dlsys_syntax::Files;
 use dlsys_syntax::ast::{Document, Expression, Item, Name, Text};
@@ -277,5 +277,9 @@ pub fn unused_surfaces(appearance: &Appearance, is_used: impl Fn(&str) -> bool, 
 /// Help for an unknown surface.
 pub fn surface_hint(name: &str, appearance: &Appearance) -> Option<String> {
     let declared = appearance.surfaces.iter().map(|shape| shape.name.as_str());
+    let large = name.to_uppercase();
+    if BUILT_IN_SURFACES.contains(&large.as_str()) {
+        return Some(format!("did you mean `{large}`?"));
+    }
     did_you_mean(name, declared).or_else(|| Some(format!("declare it: `surface {name} from \"file.s\"`")))
 }

@@ -252,7 +252,7 @@ impl<'d> Parts<'d> {
         inputs::check(&model, inputs, diagnostics);
         check::coverage(&model, diagnostics);
         dead_rules::rules(&model, &self.written, document, diagnostics);
-        check::inert_modules(&model, occurs, diagnostics);
+        check::inert_modules(&model, occurs, drawn, diagnostics);
         porting::strings(document, &self.written, diagnostics);
         porting::drawn_words(&model, drawn, diagnostics);
         let all = drawn.iter().chain(occurs).map(|(k, s)| (*k, *s)).collect();

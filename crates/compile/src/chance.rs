@@ -324,7 +324,9 @@ impl RuleBuilder<'_> {
         let graph = &mut self.scope.graph;
         let (clock, zero) = (graph.var(hazard.parameter as u32), graph.constant(0.0));
         let down = graph.binary(Binary::Le, clock, zero);
-        self.scope.comparisons.insert(down, (hazard.span, Arc::new(["clock".to_owned(), "0".to_owned()])));
+        self.scope
+            .comparisons
+            .insert(down, (hazard.span, Arc::new(["clock".to_owned(), "0".to_owned()].into())));
         self.decompose(down, hazard.span, atoms)
     }
 
@@ -342,7 +344,9 @@ impl RuleBuilder<'_> {
         }
         let least = graph.constant(LEAST_RATE);
         let mut fault = graph.binary(Binary::Lt, hazard.rate, least);
-        self.scope.comparisons.insert(fault, (hazard.span, Arc::new(["rate".to_owned(), "0".to_owned()])));
+        self.scope
+            .comparisons
+            .insert(fault, (hazard.span, Arc::new(["rate".to_owned(), "0".to_owned()].into())));
         if let Some(guard) = hazard.guard {
             fault = self.scope.graph.binary(Binary::And, guard, fault);
         }

@@ -9,7 +9,8 @@ use crate::scene_checks::is_hidden;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, ConditionStep, ContextPart, DETACH, DRAWN_WORDS,
-    ELASTIC, GROUND, KindId, Model, Pattern, Remedy, Rule, SOURCE, SURFACE_SIZES, Sign, base_of, class_of,
+    ELASTIC, GROUND, KindId, Model, Pattern, Remedy, Rule, SOURCE, SURFACE_SIZES, Sign, ZeroCrossing,
+    base_of, class_of,
 };
 use dlsys_syntax::ast;
 use dlsys_syntax::foreign_syntax;
@@ -237,13 +238,19 @@ pub fn coverage(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
                     || rule.solves.iter().any(|s| s.guard.is_always())
                     || others.into_iter().any(|(_, s)| s.guard.atoms().any(|(a, _)| a == atom));
                 if !covered && !solve.unreachable[atom] && said.insert(atom) {
+                    // What never changes is not left at the boundary, but a module may be born beyond it.
+                    let (why, sign) = match solve.zero_crossings[atom] {
+                        ZeroCrossing::Constant => {
+                            ("a module for which this is false has no equation and no production", Sign::Any)
+                        }
+                        _ => {
+                            ("when this stops being true, there is no equation and no production", Sign::Zero)
+                        }
+                    };
                     diagnostics.push(
                         Diagnostic::warning("no production covers this boundary of the domain")
-                            .at(
-                                rule.atoms[atom],
-                                "when this stops being true, there is no equation and no production",
-                            )
-                            .help(match Remedy::new(&model.kinds, rule, atom, comparison, Sign::Zero) {
+                            .at(rule.atoms[atom], why)
+                            .help(match Remedy::new(&model.kinds, rule, atom, comparison, sign) {
                                 Some(Remedy { produce: Some(clause), .. }) => {
                                     format!("add a clause for it, such as `{clause}`")
                                 }
@@ -259,8 +266,13 @@ pub fn coverage(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Warns of modules without any effect: no rule, no drawing, no context.
-pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
+/// Warns of modules without any effect: no rule, no drawing, no context. Of those in the drawings of others only surfaces count here.
+pub fn inert_modules(
+    model: &Model,
+    occurs: &HashMap<KindId, Span>,
+    drawn: &HashMap<KindId, Span>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
     let in_context: HashSet<KindId> = model
         .rules
         .iter()
@@ -273,7 +285,9 @@ pub fn inert_modules(model: &Model, occurs: &HashMap<KindId, Span>, diagnostics:
         .filter(|(_, k)| !k.has_no_rules() || k.interpretation.is_some())
         .map(|(_, k)| k.name.as_str())
         .collect();
-    let mut all: Vec<(Span, KindId)> = occurs.iter().map(|(kind, span)| (*span, *kind)).collect();
+    let surfaces = drawn.iter().filter(|(kind, _)| model.kinds.get(**kind).class() == Class::Surface);
+    let mut all: Vec<(Span, KindId)> =
+        occurs.iter().chain(surfaces).map(|(kind, span)| (*span, *kind)).collect();
     all.sort_unstable();
     let mut said = HashSet::new();
     for (span, id) in all {

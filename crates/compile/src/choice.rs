@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::conditions::Sides;
 use crate::scope::{Lowered, Scope};
 use dlsys_diagnostic::Diagnostic;
 use dlsys_expr::{NodeId, NodeMap};
@@ -39,7 +40,7 @@ impl Scope {
         for (case, then, value) in links.into_iter().rev() {
             let link = self.compare(Comparison::Equal, node, case);
             let sides = [subject, value].map(|id| print::expression(all, id));
-            let at = (all.span(subject).to(all.span(value)), Arc::new(sides));
+            let at = (all.span(subject).to(all.span(value)), Arc::new(Sides::from(sides)));
             self.comparisons.entry(link).or_insert(at);
             whole = Some(self.graph.select(link, then, whole?));
         }

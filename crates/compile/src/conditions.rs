@@ -11,6 +11,19 @@ use dlsys_model::{Boundary, Comparison, Condition, ConditionStep};
 /// Maximum number of comparisons and connectives of a condition, after expansion of functions.
 const MAX_CONDITION: usize = 10_000;
 
+/// The sides of a comparison as written.
+pub struct Sides {
+    pub written: [String; 2],
+    /// True if its node in the graph has them in the opposite order.
+    pub turned: bool,
+}
+
+impl From<[String; 2]> for Sides {
+    fn from(written: [String; 2]) -> Sides {
+        Sides { written, turned: false }
+    }
+}
+
 /// The pairs of expressions that the conditions of a rule compare.
 #[derive(Default)]
 pub struct Atoms {
@@ -88,13 +101,15 @@ impl Atoms {
         b: NodeId,
         comparison: Comparison,
         span: Span,
-        sides: Option<&[String; 2]>,
+        sides: Option<&Sides>,
     ) -> ConditionStep {
         let (pair, comparison) = if a <= b { ((a, b), comparison) } else { ((b, a), comparison.mirrored()) };
         let atom = *self.index.entry(pair).or_insert_with(|| {
             self.sides.push(pair);
             self.spans.push(span);
-            let known = sides.map(|[left, right]| Boundary::new(left, right, a > b));
+            let known = sides.map(|Sides { written: [left, right], turned }| {
+                Boundary::new(left, right, *turned != (a > b))
+            });
             self.boundaries.push(known.unwrap_or_default());
             self.sides.len() as u32 - 1
         });

@@ -65,9 +65,10 @@ pub(crate) fn build(
             Item::Plant { name, file, settings } => {
                 builder.plant((name, file, settings), *span, appearance, nesting)
             }
-            Item::Ground(height) => {
+            Item::Ground { height, color: of_floor } => {
                 builder.once("ground", *span);
                 builder.scenery.ground = builder.scope.constant_value(&document.expressions, *height);
+                builder.scenery.ground_color = of_floor.as_ref().and_then(|text| color(text, builder.scope));
             }
             Item::Bed { soil, file, attributes, textures } => {
                 builder.once("ground", *span);

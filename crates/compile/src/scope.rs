@@ -8,6 +8,7 @@ use crate::advice;
 use crate::air::{self, Air};
 use crate::call::Call;
 use crate::chance::Draws;
+use crate::conditions::Sides;
 use crate::inputs;
 use crate::land::{self, Land};
 use dlsys_diagnostic::{Diagnostic, Span};
@@ -82,11 +83,11 @@ pub struct Scope {
     pub(super) unknown: HashSet<Arc<str>>,
     /// Place and text of the comparisons of the current rule, by node. Rules number their variables alike, so that the nodes
     /// of one rule are not valid in another.
-    pub comparisons: NodeMap<(Span, Arc<[String; 2]>)>,
+    pub comparisons: NodeMap<(Span, Arc<Sides>)>,
     /// The aggregates of the current rule, in the order of their variables.
     pub gathered: Vec<Gathered>,
     /// Place and text of the comparisons in the bodies of functions, by node.
-    pub(super) function_comparisons: NodeMap<(Span, Arc<[String; 2]>)>,
+    pub(super) function_comparisons: NodeMap<(Span, Arc<Sides>)>,
     pub diagnostics: Vec<Diagnostic>,
     /// Names that only comments define, with their values.
     pub(super) commented: HashMap<Arc<str>, String>,
@@ -346,10 +347,12 @@ impl Scope {
             let (Some(left), Some(right)) = (a, b) else { return None };
             let link = self.compare(*comparison, left, right);
             self.comparisons.entry(link).or_insert_with(|| {
-                let sides = [a_id, *operand].map(|id| print::expression(all, id));
+                let written = [a_id, *operand].map(|id| print::expression(all, id));
                 // A choice has the lowest precedence.
-                let sides = sides.map(|s| if s.starts_with("if ") { format!("({s})") } else { s });
-                (all.span(a_id).to(all.span(*operand)), sides.into())
+                let written = written.map(|s| if s.starts_with("if ") { format!("({s})") } else { s });
+                // The graph has no `>`.
+                let turned = matches!(comparison, Comparison::Greater | Comparison::GreaterOrEqual);
+                (all.span(a_id).to(all.span(*operand)), Sides { written, turned }.into())
             });
             whole = Some(match whole {
                 Some(before) => self.graph.binary(Binary::And, before, link),

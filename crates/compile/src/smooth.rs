@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::analysis::{driven_form, outside_of_drivers};
-use crate::conditions::Atoms;
+use crate::conditions::{Atoms, Sides};
 use crate::rules::RuleBuilder;
 use dlsys_diagnostic::Span;
 use dlsys_expr::{Binary, Graph, Node, NodeId, NodeMap, NodeSet, Part, Unary};
@@ -174,7 +174,7 @@ impl Frozen {
         root: NodeId,
         still: &dyn Fn(u32) -> bool,
         outside: Option<&NodeSet>,
-        comparisons: &mut NodeMap<(Span, Arc<[String; 2]>)>,
+        comparisons: &mut NodeMap<(Span, Arc<Sides>)>,
         span: Span,
     ) -> NodeId {
         graph.rewrite(&[root], |graph, id, rebuilt| {
@@ -200,7 +200,7 @@ impl Frozen {
         id: NodeId,
         rebuilt: Node,
         still: &dyn Fn(u32) -> bool,
-        comparisons: &mut NodeMap<(Span, Arc<[String; 2]>)>,
+        comparisons: &mut NodeMap<(Span, Arc<Sides>)>,
         span: Span,
     ) -> Option<NodeId> {
         let zero = graph.constant(0.0);
@@ -244,7 +244,7 @@ impl Frozen {
                 let moved = graph.curve(curve, Part::Phase, a);
                 let (piece, change) = self.level(graph, phase, moved, false);
                 let sides = [graph.curve_of(curve).name.clone(), "its value at a knot".to_owned()];
-                comparisons.entry(change).or_insert((span, Arc::new(sides)));
+                comparisons.entry(change).or_insert((span, Arc::new(sides.into())));
                 Some(graph.piece(curve, part, piece, a))
             }
             _ => None,

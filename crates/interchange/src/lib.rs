@@ -244,7 +244,7 @@ pub fn grow(
         last,
         options: options.clone(),
         palette,
-        floor_color: dlsys_render::Page::BACKGROUND,
+        floor_color: model.scenery.ground_color.map_or(dlsys_render::Page::BACKGROUND, Color::hex),
         contours,
         rules: model.rules.iter().map(|rule| rule.label.clone()).collect(),
         tracks,

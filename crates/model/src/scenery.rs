@@ -20,6 +20,8 @@ pub struct Scenery {
     pub camera: Option<Camera>,
     /// The height of a rigid floor without end, in scene units.
     pub ground: Option<f64>,
+    /// Its colour, if it is declared.
+    pub ground_color: Option<Rgb>,
     /// What a unit of the model is in SI.
     pub units: Units,
     /// The wind.

@@ -163,6 +163,7 @@ fn description(recording: &Recording, outlines: &[Vec<Spoke>], is_scene: bool) -
             json!({ "eye": seen(at.eye), "aim": seen(at.aim), "angle": at.angle })
         }),
         "floor": recording.surroundings.floor.map(|height| height - recording.centre.y),
+        "floorColor": recording.surroundings.floor_color.map(|color| color.to_string()),
         "shaders": shaders,
     })
 }

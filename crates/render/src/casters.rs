@@ -65,9 +65,37 @@ pub(super) struct Casters<'s> {
     numbers: HashMap<(*const Scene, i32), usize>,
     /// By group, if it is kept.
     drafts: Vec<Option<Draft<'s>>>,
-    middle: Vector,
-    half: Vector,
+    around: Reach,
+    /// Around all but the ground of soil.
+    core: Reach,
     count: usize,
+}
+
+/// A box: its middle, and half of its sides.
+pub(super) type Reach = [Vector; 2];
+
+/// The box around points, as far as they are known.
+struct Around([Vector; 2]);
+
+impl Around {
+    fn nothing() -> Around {
+        Around([Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY)])
+    }
+
+    fn include(&mut self, at: &Vector) {
+        let [low, high] = self.0;
+        self.0 = [low.inf(at), high.sup(at)];
+    }
+
+    fn merge(&mut self, other: &Around) {
+        let ([low, high], [other_low, other_high]) = (self.0, other.0);
+        self.0 = [low.inf(&other_low), high.sup(&other_high)];
+    }
+
+    fn reach(&self) -> Option<Reach> {
+        let [low, high] = self.0;
+        (low.x <= high.x).then(|| [(low + high) / 2.0, (high - low) / 2.0])
+    }
 }
 
 impl<'s> Casters<'s> {
@@ -89,8 +117,8 @@ impl<'s> Casters<'s> {
             groups: vec![own],
             numbers: HashMap::new(),
             drafts: Vec::new(),
-            middle: Vector::zeros(),
-            half: Vector::zeros(),
+            around: [Vector::zeros(); 2],
+            core: [Vector::zeros(); 2],
             count: 0,
         };
         casters.gather(scene, None, &scale_at, &counts);
@@ -155,7 +183,7 @@ impl<'s> Casters<'s> {
 
     /// Finds the box around everything, and how much there is.
     fn measure(&mut self) {
-        let (mut low, mut high) = (Vector::repeat(f64::INFINITY), Vector::repeat(f64::NEG_INFINITY));
+        let (mut around, mut core) = (Around::nothing(), Around::nothing());
         let (mut count, mut kept) = (0, 0);
         let mut drafts = Vec::with_capacity(self.groups.len());
         for group in &self.groups {
@@ -163,13 +191,17 @@ impl<'s> Casters<'s> {
             for place in &group.places {
                 let place = place.as_ref();
                 let vertices = &draft.mesh.vertices;
-                for (v, _) in self.casting(&draft.mesh.faces, place).flat_map(|face| face.corners) {
-                    let at = vertices[v as usize];
-                    let at = place.map_or(at, |place| place.point(at)).coords;
-                    (low, high) = (low.inf(&at), high.sup(&at));
+                let soil = group.scene.terrain.filter(|_| place.is_none());
+                for face in self.casting(&draft.mesh.faces, place) {
+                    let is_soil = Some(face.owner) == soil;
+                    for (v, _) in face.corners {
+                        let at = vertices[v as usize];
+                        let at = place.map_or(at, |place| place.point(at)).coords;
+                        if is_soil { &mut around } else { &mut core }.include(&at);
+                    }
                 }
                 for end in draft.lines(place).flat_map(|(ends, _)| ends) {
-                    (low, high) = (low.inf(&end.coords), high.sup(&end.coords));
+                    core.include(&end.coords);
                 }
                 count += self.casting(&draft.mesh.faces, place).count() + draft.lines(place).count();
             }
@@ -177,16 +209,16 @@ impl<'s> Casters<'s> {
             drafts.push(Some(draft).filter(|_| kept <= KEPT));
         }
         (self.drafts, self.count) = (drafts, count);
-        if low.x <= high.x {
-            (self.middle, self.half) = ((low + high) / 2.0, (high - low) / 2.0);
-        }
+        around.merge(&core);
+        self.around = around.reach().unwrap_or(self.around);
+        self.core = core.reach().unwrap_or(self.around);
     }
 
     /// Passes everything on, a batch at a time.
     pub(super) fn each_batch(&self, mut visit: impl FnMut(&Batch)) {
         let mut batch = Batch::default();
         let relative = |p: Point| {
-            let p = p.coords - self.middle;
+            let p = p.coords - self.around[0];
             [p.x as f32, p.y as f32, p.z as f32]
         };
         let mut pass_on = |batch: &mut Batch| {
@@ -232,9 +264,14 @@ impl<'s> Casters<'s> {
         visit(&batch);
     }
 
-    /// The middle of the box around everything, and half of its sides.
-    pub(super) fn around(&self) -> [Vector; 2] {
-        [self.middle, self.half]
+    /// The box around everything.
+    pub(super) fn around(&self) -> Reach {
+        self.around
+    }
+
+    /// The box around everything but ground of soil, which reaches much further than what stands on it.
+    pub(super) fn core(&self) -> Reach {
+        self.core
     }
 
     /// Number of triangles and thin stems.

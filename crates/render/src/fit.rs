@@ -8,7 +8,7 @@ use super::extent::{Extent, Shadow};
 use super::light::Light;
 use super::tube::TubeStyle;
 use super::{Page, View, number, painter};
-use dlsys_geometry::scene::{Bounds, Point, Scene, Surroundings, Width, sin_cos_degrees};
+use dlsys_geometry::scene::{Bounds, Point, Scene, Surroundings, Viewpoint, Width, sin_cos_degrees};
 
 /// Drawings less deep than this part of their extent are flat.
 const FLAT: f64 = 1e-6;
@@ -165,6 +165,7 @@ impl Survey {
             zoom: self.zoom,
             follows_cameras: self.follows_cameras,
             turn: 0.0,
+            shaded: None,
         }
     }
 }
@@ -197,6 +198,8 @@ pub struct Fit {
     follows_cameras: bool,
     /// By how many degrees cameras have gone round.
     turn: f64,
+    /// The part of what the camera sees in which the floor has shades: left, bottom, right and top. `None`: all of it.
+    pub(super) shaded: Option<[f64; 4]>,
 }
 
 /// The shape of pictures of declared cameras: width by height.
@@ -209,6 +212,7 @@ fn joined(flags: &Surroundings, scene: &Surroundings) -> Surroundings {
         sky: flags.sky.or(scene.sky),
         camera: flags.camera.or(scene.camera),
         floor: flags.floor.or(scene.floor),
+        floor_color: flags.floor_color.or(scene.floor_color),
     }
 }
 
@@ -222,6 +226,26 @@ impl Fit {
         const FINEST: f64 = 5e-7;
         let size = self.accuracy / Fit::ACCURACY;
         Fit { accuracy: accuracy.max(size * FINEST), ..self }
+    }
+
+    /// The same for pictures on a page, in these surroundings: what a camera shows large, or a flag magnifies, is not coarser for what is far
+    /// away and makes the extent large, such as petals that the wind has taken.
+    pub fn for_pictures(self, around: &Surroundings, page: &Page) -> Fit {
+        /// Pixels that the accuracy may be, and those that it becomes where it is more.
+        const MOST: f64 = 0.75;
+        const WANTED: f64 = 0.35;
+        let smaller = around.camera.filter(|_| self.follows_cameras).map(|at| self.smaller_side(&at));
+        let side = f64::from(page.pixels[0].min(page.pixels[1]));
+        let pixels = smaller.map_or_else(|| page.pixels_per_unit(), |smaller| side / smaller);
+        let is_coarse = pixels.is_finite() && self.accuracy * pixels > MOST;
+        let accuracy = if is_coarse { WANTED / pixels } else { self.accuracy };
+        Fit { accuracy, ..self }
+    }
+
+    /// The smaller side of what a declared camera sees in its plane of focus.
+    fn smaller_side(&self, at: &Viewpoint) -> f64 {
+        let slope = (at.angle.clamp(*Camera::FIELDS.start(), *Camera::FIELDS.end()) / 2.0).to_radians().tan();
+        2.0 * (at.eye - at.aim).norm() * slope / self.zoom
     }
 
     /// The same for a camera that has gone round the axis y by this angle, in degrees from the front towards the side: cameras of flags and of the model round the vertical axis through their aim.
@@ -290,8 +314,7 @@ impl Fit {
         });
         let Some((camera, at)) = camera else { return (self.clone(), *page) };
         let [width, height] = page.pixels.map(f64::from);
-        let slope = (at.angle.clamp(*Camera::FIELDS.start(), *Camera::FIELDS.end()) / 2.0).to_radians().tan();
-        let smaller = 2.0 * (at.eye - at.aim).norm() * slope / self.zoom;
+        let smaller = self.smaller_side(&at);
         let [w, h] = [width, height].map(|side| smaller * side / width.min(height));
         let aim = camera.project(at.aim);
         let picture = Picture::of([aim.x - w / 2.0, aim.y - h / 2.0, w, h]);
@@ -301,6 +324,40 @@ impl Fit {
     /// Left, bottom, right and top of a survey as this camera sees it; `None` if it is empty.
     pub(super) fn frame_of(&self, survey: &Survey) -> Option<[f64; 4]> {
         survey.seen.shadow(self.default_width).map(|shadow| self.camera.frame(&shadow))
+    }
+
+    /// The same with the shade on the floor, as far as it is to be seen.
+    pub(super) fn shaded_frame_of(&self, survey: &Survey) -> Option<[f64; 4]> {
+        /// How far around a plant it darkens the floor, and the longest shadow, in parts of its height above the floor.
+        const AROUND: f64 = 0.3;
+        const LONGEST: f64 = 2.5;
+        let frame = self.frame_of(survey)?;
+        let around = survey.first_surroundings();
+        let Some(([low, high], floor)) =
+            survey.space.corners(self.default_width).zip(around.floor).filter(|_| !self.light.is_flat())
+        else {
+            return Some(frame);
+        };
+        let height = (high.y - floor).max(0.0);
+        let shift = around.sun.filter(|sun| sun.y > 0.0).map_or([0.0; 2], |sun| {
+            let long = (sun.x.hypot(sun.z) / sun.y).max(f64::MIN_POSITIVE);
+            [sun.x, sun.z].map(|x| -x / sun.y * height * (LONGEST / long).min(1.0))
+        });
+        let reach = AROUND * height;
+        let ends =
+            |low: f64, high: f64, shift: f64| [low - reach + shift.min(0.0), high + reach + shift.max(0.0)];
+        let (xs, zs) = (ends(low.x, high.x, shift[0]), ends(low.z, high.z, shift[1]));
+        let corners = xs.into_iter().flat_map(|x| zs.map(|z| self.camera.project(Point::new(x, floor, z))));
+        Some(corners.fold(frame, |[left, bottom, right, top], at| {
+            [left.min(at.x), bottom.min(at.y), right.max(at.x), top.max(at.y)]
+        }))
+    }
+
+    /// The same for one of several pictures on a sheet: this part of what the camera sees, left, bottom, right and top. The shade on the
+    /// floor fades towards its rim.
+    pub(super) fn for_cell(&self, [left, bottom, right, top]: [f64; 4]) -> Fit {
+        let picture = Picture::of([left, bottom, right - left, top - bottom]);
+        Fit { picture, shaded: Some([left, bottom, right, top]), ..self.clone() }
     }
 }
 
@@ -374,7 +431,7 @@ impl Picture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dlsys_geometry::scene::{MaterialId, Owner, Polygon, Vector, Viewpoint};
+    use dlsys_geometry::scene::{MaterialId, Owner, Polygon, Vector};
     use dlsys_tree::Lineage;
 
     #[test]
@@ -435,6 +492,29 @@ mod tests {
             [aim.x - left - width / 2.0, aim.y - bottom - height / 2.0]
         };
         assert!([middle(&fit), middle(&before)].iter().flatten().all(|x| x.abs() < 1e-9));
+    }
+
+    /// What lies a thousand times as far away as the camera sees does not make what it sees coarse.
+    #[test]
+    fn a_camera_asks_for_its_own_accuracy() {
+        let mut scene = Scene::default();
+        let owner = scene.add_owner(Owner { name: "P".into(), lineage: Lineage::of_axiom(0) });
+        let vertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 2000.0]].map(Point::from).to_vec();
+        scene.polygons.push(Polygon { vertices, material: MaterialId::LEAF, owner });
+        let fit_of = |scene: &Scene, view: View| {
+            let mut survey = Survey::new(view);
+            survey.add(scene);
+            let fit = survey.fit();
+            let page = Page::new(fit.picture, crate::Size::Exact(600, 400), None).expect("a page");
+            (fit.clone().for_pictures(&survey.first_surroundings(), &page).accuracy, fit.accuracy)
+        };
+        let (chosen, usual) = fit_of(&scene, View::new(90.0, 0.0).expect("a view"));
+        assert_eq!((chosen, usual), (1.0, 1.0), "all is seen");
+        scene.surroundings.camera =
+            Some(Viewpoint { eye: Point::new(0.0, 0.0, 5.0), aim: Point::origin(), angle: 40.0 });
+        let (chosen, _) = fit_of(&scene, View::FRONT);
+        // 400 pixels are 3.6 units.
+        assert!((0.002..0.005).contains(&chosen), "{chosen}");
     }
 
     #[test]

@@ -32,7 +32,8 @@ pub(super) fn added<'s>(
     fit: &Fit,
     page: Option<&Page>,
 ) -> (Cow<'s, Scene>, Option<MaterialId>) {
-    let Some(height) = fit.surroundings(scene).floor else { return (Cow::Borrowed(scene), None) };
+    let around = fit.surroundings(scene);
+    let Some(height) = around.floor else { return (Cow::Borrowed(scene), None) };
     let vertices = match page {
         Some(page) => outline(fit, height, &Lens::new(fit, page.pixels, page.placement())),
         None => square(fit, height, MESHED).to_vec(),
@@ -42,7 +43,7 @@ pub(super) fn added<'s>(
     }
     let mut scene = scene.clone();
     let owner = scene.add_owner(Owner { name: NAME.into(), lineage: Lineage::of_axiom(0) });
-    let material = scene.palette.add("ground", Page::BACKGROUND);
+    let material = scene.palette.add("ground", around.floor_color.unwrap_or(Page::BACKGROUND));
     scene.polygons.push(Polygon { vertices, material, owner });
     (Cow::Owned(scene), Some(material))
 }

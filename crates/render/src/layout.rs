@@ -2,8 +2,9 @@
 //!
 //! All frames have one scale and one camera; a sheet only moves their pictures.
 
+use super::lighting::floor_color;
 use super::{Fit, Picture, Survey};
-use dlsys_geometry::scene::Point;
+use dlsys_geometry::scene::{Color, Point};
 
 /// How the frames of an animation are put on pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,6 +74,8 @@ pub struct Sheet {
     pub(super) letters: f64,
     /// A stack of frames that are hardly more than lines.
     pub(super) lines: bool,
+    /// The floor that all frames stand on, and its colour if that is not the one of the background.
+    pub(super) floor: Option<Option<Color>>,
 }
 
 /// Opacity of the oldest frame of an overlay. The last one has 1.
@@ -95,8 +98,15 @@ impl Sheet {
             Layout::Frames | Layout::Overlay => overlay(layout, fit, &seen),
             Layout::Stack => stack(&seen, spacing.row_height),
             Layout::Grid => {
+                let around = frames.first().map(Survey::first_surroundings).unwrap_or_default();
+                let floor = around.floor.filter(|_| !fit.light.is_flat()).map(|_| floor_color(&around));
+                let seen = match floor {
+                    Some(_) => frames.iter().map(|survey| fit.shaded_frame_of(survey)).collect(),
+                    None => seen,
+                };
                 let ground = fit.camera.project(Point::origin()).y;
-                grid(&seen, ground, captions, spacing.columns.unwrap_or(seen.len()).max(1))
+                let columns = spacing.columns.unwrap_or(seen.len()).max(1);
+                Sheet { floor, ..grid(&seen, ground, captions, columns) }
             }
         }
     }
@@ -119,7 +129,7 @@ fn overlay(layout: Layout, fit: &Fit, seen: &[Option<[f64; 4]>]) -> Sheet {
         let age = (seen.len() - 1 - i) as f64 / last;
         Cell { offset: [0.0; 2], frame, opacity: 1.0 - (1.0 - FAINTEST) * age, caption: None }
     });
-    Sheet { layout, picture: fit.picture, cells: cells.collect(), letters: 0.0, lines: false }
+    Sheet { layout, picture: fit.picture, cells: cells.collect(), letters: 0.0, lines: false, floor: None }
 }
 
 fn stack(seen: &[Option<[f64; 4]>], row_height: Option<f64>) -> Sheet {
@@ -144,7 +154,7 @@ fn stack(seen: &[Option<[f64; 4]>], row_height: Option<f64>) -> Sheet {
         })
         .collect();
     let all = union(cells.iter().filter_map(|cell| cell.frame));
-    Sheet { layout: Layout::Stack, picture: Picture::around(all), cells, letters: 0.0, lines }
+    Sheet { layout: Layout::Stack, picture: Picture::around(all), cells, letters: 0.0, lines, floor: None }
 }
 
 fn grid(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], columns: usize) -> Sheet {
@@ -187,6 +197,7 @@ fn grid(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], columns: us
         cells,
         letters,
         lines: false,
+        floor: None,
     }
 }
 

@@ -7,9 +7,9 @@ use super::casters::Casters;
 use super::haze::{self, Haze};
 use super::lens::Lens;
 use super::light::{GLOSS, SHARPNESS, Spot, TRANSMITTED};
-use super::shadow::Maps;
+use super::shadow::{Maps, OpenSky};
 use super::{Camera, Fit, Page, floor, light};
-use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Vector};
+use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Surroundings, Vector};
 
 /// Strengths of light on what is fully exposed to it: the sky's beside a sun and alone, the sun's, and what the ground throws back.
 const SKY: f64 = 0.56;
@@ -62,7 +62,7 @@ pub(super) struct Lighting<'a> {
     maps: Option<Maps>,
     floor: Option<f64>,
     open_sky: Option<OpenSky>,
-    /// The colour of the floor under a declared sky.
+    /// The colour of the floor, if it has one of its own.
     ground: Option<Color>,
     haze: Option<Haze>,
 }
@@ -100,10 +100,10 @@ impl<'a> Lighting<'a> {
             };
             let casters = Casters::new(scene, fit, scale.min(1500.0 / extent), seen, ground, counts);
             let maps = (casters.count() > 0).then(|| Maps::new(&casters, sun, scale, threads))?;
-            open_sky = floor.map(|height| OpenSky::new(&maps, casters.around(), height));
+            open_sky = floor.map(|height| OpenSky::new(&maps, casters.around(), height, threads));
             Some(maps)
         });
-        let ground = around.sky.map(|[_, horizon]| between(horizon, EARTH, EARTHY));
+        let ground = floor_color(&around);
         let maps = maps.flatten();
         let visible = |at: &Vector| match (&maps, sun) {
             (Some(maps), Some(sun)) => maps.sun(*at, sun),
@@ -230,7 +230,10 @@ impl<'a> Lighting<'a> {
                 here / open
             }
         };
-        pool * light.min(1.0)
+        match self.fit.shaded {
+            None => pool * light.min(1.0),
+            Some(rim) => 1.0 - (1.0 - light.min(1.0)) * inside(rim, seen),
+        }
     }
 
     /// The floor where it is seen: times its opacity, and the opacity. Without a sky it is as light as the background.
@@ -259,71 +262,21 @@ impl<'a> Lighting<'a> {
     }
 }
 
+/// 1 well within a rectangle, and 0 on its rim and beyond.
+fn inside([left, bottom, right, top]: [f64; 4], at: Point) -> f64 {
+    const RIM: f64 = 0.12;
+    let room = (at.x - left).min(right - at.x).min(at.y - bottom).min(top - at.y);
+    let part = (room / (RIM * (right - left).min(top - bottom))).clamp(0.0, 1.0);
+    part * part * (3.0 - 2.0 * part)
+}
+
+/// The colour of a floor in full light: the declared one, or that of earth under a declared sky; `None`: that of the background.
+pub(super) fn floor_color(around: &Surroundings) -> Option<Color> {
+    around.floor_color.or(around.sky.map(|[_, horizon]| between(horizon, EARTH, EARTHY)))
+}
+
 /// A colour between two.
 fn between(from: Color, to: Color, part: f64) -> Color {
     let mix = |a: u8, b: u8| (f64::from(a) + (f64::from(b) - f64::from(a)) * part + 0.5) as u8;
     Color { red: mix(from.red, to.red), green: mix(from.green, to.green), blue: mix(from.blue, to.blue) }
-}
-
-/// The part of the sky that is seen from places of the floor, on a grid: it changes slowly.
-struct OpenSky {
-    low: [f64; 2],
-    /// Cells in a scene unit.
-    scale: f64,
-    /// By row.
-    parts: Vec<f32>,
-}
-
-impl OpenSky {
-    /// Places along a side of the grid.
-    const SIDE: usize = 320;
-    /// How far the grid reaches beyond the box around everything, in parts of its height.
-    const BEYOND: f64 = 1.5;
-
-    fn new(maps: &Maps, [middle, half]: [Vector; 2], height: f64) -> OpenSky {
-        let reach = half.x.max(half.z) + OpenSky::BEYOND * (middle.y + half.y - height).max(0.0);
-        let reach = if reach > 0.0 { reach } else { 1.0 };
-        let low = [middle.x - reach, middle.z - reach];
-        let side = OpenSky::SIDE;
-        let scale = (side - 1) as f64 / (2.0 * reach);
-        let at = |i: usize, k: usize| low[k] + i as f64 / scale;
-        let mut parts: Vec<f32> = (0..side * side)
-            .map(|i| {
-                let place = Vector::new(at(i % side, 0), height, at(i / side, 1));
-                maps.sky(place, Vector::y()).min(1.0) as f32
-            })
-            .collect();
-        for _ in 0..2 {
-            parts = OpenSky::smoothed(&parts);
-        }
-        OpenSky { low, scale, parts }
-    }
-
-    /// Each value the mean of three by three.
-    fn smoothed(parts: &[f32]) -> Vec<f32> {
-        let side = OpenSky::SIDE;
-        let near = |i: usize| i.saturating_sub(1)..=(i + 1).min(side - 1);
-        let mean = |column: usize, row: usize| {
-            let values = near(row).flat_map(|row| near(column).map(move |column| parts[row * side + column]));
-            let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
-            sum / count
-        };
-        (0..side * side).map(|i| mean(i % side, i / side)).collect()
-    }
-
-    /// The part at a place; 1 beyond the grid, to which it rises at the rim.
-    fn at(&self, place: Vector) -> f64 {
-        let [x, z] = [(place.x - self.low[0]) * self.scale, (place.z - self.low[1]) * self.scale];
-        let last = (OpenSky::SIDE - 1) as f64;
-        let rim = x.min(z).min(last - x).min(last - z) / (0.2 * last);
-        if rim.is_nan() || rim <= 0.0 {
-            return 1.0;
-        }
-        let [column, row] = [x, z].map(|x| (x as usize).min(OpenSky::SIDE - 2));
-        let (u, v) = (x - column as f64, z - row as f64);
-        let value = |column: usize, row: usize| f64::from(self.parts[row * OpenSky::SIDE + column]);
-        let line = |row: usize| value(column, row) * (1.0 - u) + value(column + 1, row) * u;
-        let part = line(row) * (1.0 - v) + line(row + 1) * v;
-        1.0 - (1.0 - part) * rim.min(1.0)
-    }
 }

@@ -6,13 +6,17 @@
 //!
 //! **Errors.** The edge of a shadow is smooth over three cells of the map, and a shadow begins up to [`SLOPE`] cells behind what casts it (the
 //! price of no self-shadowing on slopes). The cell of the sun's map is a pixel of the picture, or a [`FINEST`]th of the scene where that is more; that
-//! of the sky's maps is a [`COARSE`]th of the scene, so crevices narrower than a fiftieth of the scene are not darkened.
+//! of the sky's maps is a [`COARSE`]th of the scene, so crevices narrower than a fiftieth of the scene are not darkened. Ground of soil may reach
+//! far beyond what stands on it: then the sun has a second map, of that alone, and so has the sky.
+
+mod open_sky;
 
 use std::sync::{Mutex, PoisonError};
 
-use super::casters::{Batch, Casters};
+use super::casters::{Batch, Casters, Reach};
 use super::mapping::{Cut, Pinned};
 use dlsys_geometry::scene::Vector;
+pub(super) use open_sky::OpenSky;
 
 /// Places of the sky from which light comes; fewer where there are more triangles than [`MANY`].
 const PLACES: usize = 128;
@@ -22,6 +26,12 @@ const MANY: usize = 500_000;
 const FINEST: f64 = 3072.0;
 const LEAST: f64 = 256.0;
 const COARSE: f64 = 128.0;
+/// The sun has a second map if that is so many times as fine.
+const FINER: f64 = 1.5;
+/// The maps of the sky leave out ground that reaches so many times as far as what stands on it, but for a rim, in parts of the
+/// larger side, in which its shadows fade.
+const FURTHER: f64 = 2.0;
+const RIM: f64 = 0.15;
 /// Bias of depths, in cells: on a surface that faces the light, and at most.
 const BIAS: f32 = 1.0;
 const SLOPE: f32 = 8.0;
@@ -78,11 +88,14 @@ struct Map {
     size: [usize; 2],
     /// In cells, greater being nearer to the light.
     depths: Vec<f32>,
+    /// Cells at the border in which shadows fade.
+    rim: f32,
 }
 
 impl Map {
-    /// Of light from a direction, with so many cells for a scene unit, as far as `most` cells on a side allow; nothing is in it.
-    fn new([middle, half]: [Vector; 2], towards: Vector, scale: f64, most: f64) -> Map {
+    /// Of light from a direction on a box, with so many cells for a scene unit, as far as `most` cells on a side allow; nothing is in it.
+    /// Batches are relative to `middle`.
+    fn new(middle: Vector, [centre, half]: Reach, towards: Vector, scale: f64, most: f64) -> Map {
         let towards = towards.normalize();
         let aside = if towards.y.abs() < 0.9 { Vector::y() } else { Vector::z() };
         let right = aside.cross(&towards).normalize();
@@ -92,8 +105,9 @@ impl Map {
         let scale = (larger * scale).clamp(LEAST.min(most), most) / larger;
         // Two cells all round.
         let size = reach.map(|reach| (2.0 * reach * scale).ceil() as usize + 4);
-        let low = reach.map(|reach| -reach - 2.0 / scale);
-        Map { axes, middle, low, scale, size, depths: vec![f32::NEG_INFINITY; size[0] * size[1]] }
+        let low = [0, 1].map(|k| axes[k].dot(&(centre - middle)) - reach[k] - 2.0 / scale);
+        let depths = vec![f32::NEG_INFINITY; size[0] * size[1]];
+        Map { axes, middle, low, scale, size, depths, rim: 0.0 }
     }
 
     /// Adds triangles and thin stems. `placed` is memory.
@@ -212,9 +226,9 @@ impl Map {
     }
 
     /// The part of the light that comes to a point on a surface whose lit side has this normal, from 0 to 1: the mean over a square of
-    /// three by three cells.
-    fn visible(&self, at: Vector, normal: Vector) -> f64 {
-        let Some(([left, bottom], [u, v], depth)) = self.cell(at, normal, 1) else { return 1.0 };
+    /// three by three cells; `None` outside of the map.
+    fn visible(&self, at: Vector, normal: Vector) -> Option<f64> {
+        let ([left, bottom], [u, v], depth) = self.cell(at, normal, 1)?;
         // Four by four cells, those at the rim by the part that the square covers.
         let (across, along) = ([1.0 - u, 1.0, 1.0, u], [1.0 - v, 1.0, 1.0, v]);
         let mut sum = 0.0;
@@ -224,7 +238,7 @@ impl Map {
                 sum += if *held > depth { 0.0 } else { across * along };
             }
         }
-        f64::from(sum) / 9.0
+        Some(f64::from(sum) / 9.0)
     }
 
     /// The same over a square of one cell.
@@ -233,24 +247,47 @@ impl Map {
         let start = bottom * self.size[0] + left;
         let open = |k: usize| if self.depths[k] > depth { 0.0 } else { 1.0 };
         let row = |start: usize| open(start) * (1.0 - u) + open(start + 1) * u;
-        f64::from(row(start) * (1.0 - v) + row(start + self.size[0]) * v)
+        let part = row(start) * (1.0 - v) + row(start + self.size[0]) * v;
+        if self.rim == 0.0 {
+            return part.into();
+        }
+        let inside = |at: usize, side: usize| at.min(side - at) as f32;
+        let from_border = inside(left, self.size[0]).min(inside(bottom, self.size[1]));
+        (1.0 - (1.0 - part) * (from_border / self.rim).min(1.0)).into()
     }
 }
 
 /// The maps of a frame.
 pub(super) struct Maps {
-    sun: Option<Map>,
+    /// The finer one first.
+    sun: Vec<Map>,
     sky: Vec<Map>,
 }
 
 impl Maps {
     /// Maps of the sun, if there is one in this direction, with so many cells for a scene unit, and of the sky.
     pub(super) fn new(casters: &Casters, sun: Option<Vector>, scale: f64, threads: usize) -> Maps {
-        let (around, places) = (casters.around(), if casters.count() > MANY { FEW_PLACES } else { PLACES });
-        let sky = (0..places).map(|i| Map::new(around, place_of_sky(i, places), 0.0, COARSE));
-        // The sun's map is the largest, and first.
-        let mut maps: Vec<Map> =
-            sun.map(|sun| Map::new(around, sun, scale, FINEST)).into_iter().chain(sky).collect();
+        let (around, core) = (casters.around(), casters.core());
+        let places = if casters.count() > MANY { FEW_PLACES } else { PLACES };
+        let [middle, _] = around;
+        let larger = |[_, half]: Reach| half.max();
+        let is_far = larger(around) > FURTHER * larger(core);
+        let sky = (0..places).map(|i| {
+            let rim = if is_far { RIM * larger(core) } else { 0.0 };
+            let within = if is_far { [core[0], core[1].add_scalar(rim)] } else { around };
+            let mut map = Map::new(middle, within, place_of_sky(i, places), 0.0, COARSE);
+            map.rim = (rim * map.scale) as f32;
+            map
+        });
+        // The sun's maps are the largest, and first.
+        let of_sun = sun.map(|sun| {
+            let whole = Map::new(middle, around, sun, scale, FINEST);
+            let close = (core != around).then(|| Map::new(middle, core, sun, scale, FINEST));
+            close.filter(|close| close.scale > FINER * whole.scale).into_iter().chain([whole]).collect()
+        });
+        let mut maps: Vec<Map> = of_sun.unwrap_or_default();
+        let suns = maps.len();
+        maps.extend(sky);
         casters.each_batch(|batch| {
             let next = Mutex::new(maps.iter_mut());
             let work = || {
@@ -265,13 +302,13 @@ impl Maps {
                 work();
             });
         });
-        let sky = maps.split_off(usize::from(sun.is_some()));
-        Maps { sun: maps.pop(), sky }
+        let sky = maps.split_off(suns);
+        Maps { sun: maps, sky }
     }
 
     /// The part of the sun's light that comes to a point on a surface whose lit side has this normal.
     pub(super) fn sun(&self, at: Vector, normal: Vector) -> f64 {
-        self.sun.as_ref().map_or(1.0, |map| map.visible(at, normal))
+        self.sun.iter().find_map(|map| map.visible(at, normal)).unwrap_or(1.0)
     }
 
     /// The light of the sky on the side of a surface with this normal: 1 on the open ground.

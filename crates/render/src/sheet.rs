@@ -54,7 +54,12 @@ impl SheetWriter {
     pub fn new(format: Format, fit: Fit, sheet: Sheet, page: Page) -> Result<SheetWriter, Error> {
         match format.content() {
             Content::Mesh => Err(Error::NoLayout),
-            _ => Ok(SheetWriter { format, fit, sheet, page }),
+            _ => {
+                // One floor for all frames.
+                let color = sheet.floor.flatten();
+                let background = page.background.map(|background| color.unwrap_or(background));
+                Ok(SheetWriter { format, fit, sheet, page: Page { background, ..page } })
+            }
         }
     }
 
@@ -71,23 +76,45 @@ impl SheetWriter {
     /// Draws the frame with this number. A frame that the sheet has no place for is left out.
     pub fn part(&self, index: usize, scene: &Scene) -> Part {
         let cell = self.sheet.cells.get(index);
-        let scene = &*self.fit.drawn(Cow::Borrowed(scene));
+        let fit = &*self.fit_of(cell);
+        let scene = &*fit.drawn(Cow::Borrowed(scene));
         Part(match self.format.content() {
             Content::Pixels => {
                 let (size, corner, placement) = self.window(cell);
-                Drawn::Image(png::picture(scene, &self.fit, size, placement, Smoothness::Fine, 1), corner)
+                Drawn::Image(png::picture(scene, fit, size, placement, Smoothness::Fine, 1), corner)
             }
             _ => {
-                let style = svg::style(&self.fit, &self.page);
+                let style = svg::style(fit, &self.page);
                 let scene = scene.flattened();
-                let scene = &*scene.tessellated(self.fit.accuracy);
-                let (scene, floor) = floor::added(scene, &self.fit, Some(&self.page));
+                let scene = &*scene.tessellated(fit.accuracy);
+                let (scene, floor) = floor::added(scene, fit, Some(&self.page_of(fit)));
                 let (scene, style) = (&*scene, painter::Style { floor, ..style });
                 Drawn::Elements(cell.map_or_else(String::new, |_| {
                     painter::elements(scene, style, false, &format!("f{index}"))
                 }))
             }
         })
+    }
+
+    /// The fit of a frame: of one that stands on the floor of the sheet, its part of that.
+    fn fit_of(&self, cell: Option<&Cell>) -> Cow<'_, Fit> {
+        let part = cell.and_then(|cell| cell.frame.zip(Some(cell.offset)));
+        match part.filter(|_| self.sheet.floor.is_some()) {
+            None => Cow::Borrowed(&self.fit),
+            Some(([left, bottom, right, top], [x, y])) => {
+                Cow::Owned(self.fit.for_cell([left - x, bottom - y, right - x, top - y]))
+            }
+        }
+    }
+
+    /// The page of a frame alone.
+    fn page_of(&self, fit: &Fit) -> Page {
+        if fit.shaded.is_none() {
+            return self.page;
+        }
+        let [_, _, width, height] = fit.picture.area;
+        let pixels = [width, height].map(|side| (side * self.page.pixels_per_unit()).ceil().max(1.0) as u32);
+        Page { picture: fit.picture, pixels, ..self.page }
     }
 
     /// The pixels that a frame takes up: size, upper left corner, and how the camera's picture is placed in them.

@@ -129,7 +129,7 @@ impl<'s> Tubes<'s> {
         if count == 0 {
             return tubes;
         }
-        let structure = Structure::of(segments, style.default_width, &kept);
+        let structure = Structure::of(segments, style.default_width, style.grown, &kept);
         tubes.pieces.reserve(count);
         let mut profiles: HashMap<(Option<u32>, usize), usize> = HashMap::new();
         let (mut members, mut parts) = (Vec::new(), Vec::new());
@@ -157,6 +157,13 @@ impl<'s> Tubes<'s> {
             let chain = Chain { segments, radii, members: &members, accuracy, steady };
             parts.clear();
             chain.parts(style.grown, collar.as_ref(), &mut parts);
+            let before = structure.before(segments, first);
+            if let Some(&part) = parts.first().filter(|_| style.grown && before > 0.0) {
+                let [start, _] = part.centres;
+                let centres = [start - part.direction * before, start];
+                let radii = [part.radii[0]; 2];
+                parts.insert(0, Part { centres, radii, drape: 0.0, ..part });
+            }
             tubes.collars.extend(collar);
             let number = tubes.collars.len().wrapping_sub(1);
             for (i, part) in parts.iter().enumerate() {
@@ -229,8 +236,8 @@ impl<'s> Tubes<'s> {
         let length = |ends, caps| Length { segment: piece.part.segment, ends, caps };
         let cut = match begin {
             Begin::Shoulder => Some(self.end(i - 1)),
-            // That of a branch is within its parent.
-            Begin::Flat if self.segments[piece.part.segment].grows_from.is_none() => {
+            // That of a branch is within its parent, and so is that of an axis that gives way to one.
+            Begin::Flat if self.stands(piece.part.segment) => {
                 Some(CrossSection { u: Vector::zeros(), v: Vector::zeros(), ..start })
             }
             _ => None,
@@ -238,6 +245,12 @@ impl<'s> Tubes<'s> {
         let cut = cut.map(|from| length([from, start], [false; 2]));
         let caps = [begin == Begin::Dome && radius > 0.0, piece.last && piece.part.radii[1] > 0.0];
         cut.into_iter().chain([length([start, end], caps)])
+    }
+
+    /// Whether a segment grows from no other one.
+    fn stands(&self, segment: usize) -> bool {
+        let Segment { grows_from, follows, .. } = self.segments[segment];
+        grows_from.is_none() && follows.is_none()
     }
 
     /// The cross-section at the end of a piece.

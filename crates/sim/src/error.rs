@@ -300,9 +300,10 @@ impl Error {
         if site.span != Span::default() {
             d = d.at(site.span, self.remark());
         }
-        if let Error::OutsideDomain { failing, .. } = self {
+        if let Error::OutsideDomain { failing, born, .. } = self {
+            let fails = if *born { "this does not hold" } else { "this no longer holds" };
             for (span, _) in failing {
-                d = d.at(*span, "this no longer holds");
+                d = d.at(*span, fails);
             }
         }
         let descent = match site.lineage.generation {
@@ -404,6 +405,7 @@ impl Error {
 
     fn remark(&self) -> &'static str {
         match self {
+            Error::OutsideDomain { born: true, .. } => "no equation of this rule holds",
             Error::OutsideDomain { .. } => "no equation of this rule holds any more",
             Error::Chattering { .. } => "on each side of the boundary the equations lead to the other",
             Error::Cascade { .. } => "this production applies again and again",

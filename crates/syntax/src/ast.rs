@@ -291,8 +291,13 @@ pub enum Item {
         /// Values for the params of the other model.
         settings: Vec<(Name, Expression)>,
     },
-    /// `ground height`: a rigid floor without end.
-    Ground(Expression),
+    /// `ground height color "#rrggbb"`: a rigid floor without end.
+    Ground {
+        /// Its height.
+        height: Expression,
+        /// Its colour, as `#rrggbb` or `#rgb`.
+        color: Option<Text>,
+    },
     /// `light x, y, z`: the direction towards the sun.
     Light([Expression; 3]),
     /// `sky "zenith", "horizon"`: colours as `#rrggbb` or `#rgb`.
@@ -417,7 +422,7 @@ impl Item {
             Item::Contour { .. } => "contour",
             Item::Tropism { .. } => "tropism",
             Item::Plant { .. } => "plant",
-            Item::Ground(_) => "ground",
+            Item::Ground { .. } => "ground",
             Item::Light(_) => "light",
             Item::Sky(_) => "sky",
             Item::Camera { .. } => "camera",

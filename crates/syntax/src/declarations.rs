@@ -228,7 +228,7 @@ pub static DECLARATIONS: [Declaration; 35] = [
         ..row("plant", Rule::plant_item)
     },
     Declaration {
-        usage: "HEIGHT, or SOIL cell D depth H height F(x, z) extent E",
+        usage: "HEIGHT color \"#rrggbb\", or SOIL cell D depth H height F(x, z) extent E",
         summary: "what plants stand on: a floor without end, or soil that gives way",
         category: Category::Scene,
         options: &[
@@ -239,6 +239,7 @@ pub static DECLARATIONS: [Declaration; 35] = [
             option("extent", Follow::Value),
             option("texture", Follow::Text),
             option("size", Follow::Value),
+            option("color", Follow::Text),
         ],
         begins: Begins::BeforeValue,
         written: "a floor is written `ground 0`; ground of a soil, `ground clay cell 0.01 depth 0.3`",

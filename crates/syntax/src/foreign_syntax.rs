@@ -71,7 +71,7 @@ const LINES: [(&[&str], &str); 33] = [
     (&["return"], "a model is no program: a function is one expression: `def f(x) = x^2`"),
 ];
 
-const STEPS: &str = "there are no derivation steps; write the times to look at: `frames 0 .. N step 1`. Discrete rules apply at t = 1, 2, …";
+const STEPS: &str = "there are no derivation steps; write the times to look at: `frames 0 .. N step 1`; `dlsys render MODEL --at N` draws the last one alone. Discrete rules apply at t = 1, 2, …";
 const RULES: &str = "remove this line: rules stand among declarations, `A(x): if x = 1 produce F(x) A(0)`, or discrete `A(x) : x > 3 -> F(x) A(0)`";
 const PRODUCE: &str = "a clause has one successor, and strings are not put together by statements: `if x = 1 produce F(x) A(0)`; modules that repeat are productions of their own";
 const STATEMENTS: &str = "a model is no program: what is to change in time is a parameter with an equation, `A(x): solve dx/dt = 1`";
@@ -93,7 +93,9 @@ pub fn line(line: &str, at: usize) -> Option<Diagnostic> {
     let end = words[of_words - 1].1;
     let number = line.rsplit(':').next().unwrap_or_default().trim().parse::<u32>();
     let help = match number {
-        Ok(n) => help.replace("0 .. N", &format!("0 .. {n}")).replace("--seed N", &format!("--seed {n}")),
+        Ok(n) => ["0 .. ", "--at ", "--seed "].iter().fold((*help).to_owned(), |help, before| {
+            help.replace(&format!("{before}N"), &format!("{before}{n}"))
+        }),
         Err(_) => (*help).to_owned(),
     };
     Some(
@@ -172,7 +174,7 @@ pub fn symbol(text: &str, after_symbol: bool) -> Option<String> {
         ',' if after_symbol || rest.starts_with('(') => {
             format!("a colour is chosen by its number or its name: `;{}`, `;(rose)`", arguments())
         }
-        '\'' => "a colour is chosen by its number or its name: `;(n)`, `;(bark)`; `;` alone goes on to the next number, so begin with a colour of your own"
+        '\'' => "the next colour is written `;` in place of `'`; begin with a colour by its number or its name, `;(n)` or `;(bark)`"
             .to_owned(),
         '₀'..='₉' if after_symbol => "the subscript of a symbol begins with `_`: `+_1`".to_owned(),
         _ => return None,

@@ -72,7 +72,7 @@ pub(crate) fn read(builder: &mut Builder, pair: Pair) -> Built<Item> {
                 let (attributes, textures) = parts.values_and_texts()?;
                 Item::Bed { soil, file, attributes, textures }
             }
-            None => Item::Ground(parts.expression()?),
+            None => Item::Ground { height: parts.expression()?, color: parts.text_if_any() },
         },
         Rule::light_item => Item::Light(parts.triple()?),
         Rule::sky_item => Item::Sky([parts.text(), parts.text()]),
@@ -170,7 +170,10 @@ pub(crate) fn write(expressions: &Expressions, item: &Item) -> String {
             let with = if settings.is_empty() { "" } else { " with " };
             format!("plant {} from \"{}\"{with}{}", name.text, file.text, settings.join(", "))
         }
-        Item::Ground(height) => format!("ground {}", show(height)),
+        Item::Ground { height, color } => {
+            let color = color.as_ref().map(|color| format!(" color \"{}\"", color.text));
+            format!("ground {}{}", show(height), color.unwrap_or_default())
+        }
         Item::Light(direction) => format!("light {}", triple(expressions, direction)),
         Item::Sky([zenith, horizon]) => format!("sky \"{}\", \"{}\"", zenith.text, horizon.text),
         Item::Camera { eye, aim, angle } => {

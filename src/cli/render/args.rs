@@ -10,7 +10,7 @@ use crate::cli::values::{
     direction, field_of_view, layout, line_width, pixels, positive, render_format, seeds, shutter, size, sky,
     threads, turn, zoom,
 };
-use crate::render::{Format, Layout};
+use crate::render::Layout;
 use crate::scene::{Vector, Viewpoint};
 
 /// How the paper's figures are made.
@@ -35,16 +35,24 @@ pub struct RenderArgs {
     /// one scale
     #[arg(long, value_name = "A..B", value_parser = seeds, conflicts_with_all = ["seed", "events", "stats", "watch"])]
     pub seeds: Option<Seeds>,
-    /// Directory for the frames; made if it is not there. With a format of whole animations (glb, usda, webp, apng, gif, y4m, asvg) the file, or a folder for it; - is
-    /// standard output, for y4m
+    /// Directory for the frames; made if it is not there. The file, such as plant.png, for one frame (--at T) or a sheet (--layout). With a format of whole animations
+    /// (glb, usda, webp, apng, gif, y4m, asvg) the file, or a folder for it; - is standard output, for y4m
     #[arg(short, long = "out", value_name = "DIR")]
     pub out: PathBuf,
-    /// File format of the frames, or of the whole animation
-    #[arg(long, value_parser = render_format(), default_value = Format::SVG.extension())]
+    /// File format of the frames, or of the whole animation [default: that of the file that -o names, or svg]
+    #[arg(long = "format", value_name = "FORMAT", value_parser = render_format())]
+    pub chosen_format: Option<RenderFormat>,
+    /// That, or the one that the file's name says.
+    #[arg(skip)]
     pub format: RenderFormat,
     /// With a format of whole animations: units of the model's time in a second of the animation [default: 1, or, with `units … time S`, 1/S]
     #[arg(long, value_name = "V", allow_negative_numbers = true, value_parser = positive)]
     pub speed: Option<f64>,
+    /// For films: frames in a second. Without --step there are as many frames as that takes, with it each frame of that step is seen for 1/N of a second
+    ///
+    /// The film is as long as --speed says, or, with --step, as its frames: of --fps, --step and --speed two say the third. With --at T1,T2,… each of these times is seen for 1/N of a second.
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = positive)]
+    pub fps: Option<f64>,
     /// With --format usda: whether meshes keep their triangles
     #[arg(long, value_enum, default_value_t = Topology::Constant)]
     pub topology: Topology,
@@ -74,7 +82,7 @@ pub struct RenderArgs {
     /// angles. A full turn of 360 degrees is a loop: the frame after the last would be like the first. With one time, such as --at 5, the plant stands still.
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = turn)]
     pub orbit: Option<f64>,
-    /// With --orbit and one time: frames, 25 in a second of a film [default: 120]
+    /// With --orbit and one time: frames, 25 in a second of a film, or as many as --fps says [default: 120]
     #[arg(long, value_name = "N", value_parser = columns, requires = "orbit")]
     pub orbit_frames: Option<usize>,
     /// Motion blur: how long the shutter is open, in frames, or as an angle: 0.5 and 180deg are half of the interval between frames

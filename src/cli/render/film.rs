@@ -8,16 +8,14 @@ use std::time::Instant;
 
 use super::super::one_file::{file_of, place_of, spare};
 use super::{
-    Clock, Failure, ModelRun, Moments, Orbit, Render, count_of, flags, out_error, out_of_directory, play,
-    size_of, turntable,
+    Clock, Failure, ModelRun, Moments, Orbit, Render, count_of, flags, out_error, out_of_directory, pace,
+    play, size_of, turntable,
 };
 use crate::cli::album::Album;
 use crate::cli::args::RenderArgs;
 use crate::film::{Film, Format, Shape};
 use crate::render::{self, FrameWriter, Layout};
 
-/// Seconds of a film of one frame.
-const STILL: f64 = 1.0;
 /// Standard output in place of a file.
 pub(super) const STREAM: &str = "-";
 
@@ -35,6 +33,7 @@ pub fn render(args: &RenderArgs, format: Format, stale: &(dyn Fn() -> bool + Syn
 
 /// Refuses flags that do not go with a format of whole animations.
 pub(super) fn agree(args: &RenderArgs, name: &str) -> Result<(), Failure> {
+    pace::agree(args)?;
     flags::survey(args)?;
     flags::of_layouts(args)?;
     if args.layout != Layout::Frames {
@@ -105,32 +104,18 @@ pub fn render_run(
     run.write_stats(&args.shared, clock, stats)?;
     let (false, Some(out)) = (args.quiet, out) else { return Ok(()) };
     let [width, height] = writer.page.pixels;
+    let ends = pace::ends(args, &run);
     let line = format!(
-        "{}: {} of {width}x{height} pixels, {:.2} s to play, {}, in {:.2} s\n{note}",
+        "{}: {} of {width}x{height} pixels, {}{:.2} s to play, {}, in {:.2} s\n{note}{}",
         out.display(),
         count_of(run.times.len(), "frame"),
-        ends(args, &run).last().unwrap_or(&0.0),
+        pace::rate(&ends).map_or_else(String::new, |rate| format!("{} a second, ", pace::rounded(rate))),
+        ends.last().unwrap_or(&0.0),
         size_of(bytes),
-        begun.elapsed().as_secs_f64()
+        begun.elapsed().as_secs_f64(),
+        pace::remark(args, &run, &ends)
     );
     io::stdout().write_all(line.as_bytes()).map_err(out_error)
-}
-
-/// When each frame ends, in seconds; the last one lasts as long as the one before.
-pub(super) fn ends(args: &RenderArgs, run: &ModelRun) -> Vec<f64> {
-    let times = &run.times;
-    if let Some(ends) = turntable::ends(times) {
-        return ends;
-    }
-    let seconds = args.speed.map_or(run.session.model.scenery.units.time, |speed| 1.0 / speed);
-    let first = times.first().copied().unwrap_or(0.0);
-    let mut ends: Vec<f64> = times.iter().skip(1).map(|t| (t - first) * seconds).collect();
-    let last = match &times[..] {
-        [.., before, last] => (2.0 * last - before - first) * seconds,
-        _ => STILL,
-    };
-    ends.push(last);
-    ends
 }
 
 /// The second pass. Returns a line about it, too, if there is something to say.
@@ -150,7 +135,7 @@ fn film(
         io::ErrorKind::InvalidInput => usage(error),
         _ => Failure::Model(format!("error: cannot write the film: {error}\n")),
     };
-    let ends = ends(render.args, render.run);
+    let ends = pace::ends(render.args, render.run);
     let mut film = Film::begin(format, target, shape, ends, render.threads).map_err(failed)?;
     let moments = Moments::plan(render, writer, clock)?;
     let mut progress = render.bar("writing", render.run.times.len());

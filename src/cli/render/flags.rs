@@ -1,9 +1,10 @@
 //! Values of the flags of `render`, and combinations that are refused.
 
+use super::one_picture;
 use crate::cli::args::RenderArgs;
 use crate::cli::common::{Failure, cores};
 use crate::cli::shared::Topology;
-use crate::cli::values::{Background, LineWidth, Sky};
+use crate::cli::values::{Background, LineWidth, RenderFormat, Sky};
 use crate::render::{CAMERA_SHAPE, Content, Fit, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
 use crate::scene::Surroundings;
 use crate::session::Detail;
@@ -19,7 +20,7 @@ pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
         sun: args.light,
         sky: args.sky.map(|Sky(colors)| colors),
         camera: args.camera,
-        floor: None,
+        ..Surroundings::default()
     };
     let survey = Survey::new(view).with_surroundings(declared).with_zoom(args.zoom.unwrap_or(1.0));
     let survey = if args.line_width.is_some() { survey.with_one_width() } else { survey };
@@ -56,14 +57,22 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
             "--speed is for animated files; leave it out, or choose --format glb, usda, webp, apng, gif, y4m or asvg",
         ));
     }
+    if args.fps.is_some() {
+        return Err(usage(
+            "--fps is for films in one file: choose --format webp, apng, gif, y4m or asvg; of single frames there are as many as `--step S` says",
+        ));
+    }
     let extension = args.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let is_file = |name: &str| extension == name;
     let known = Format::all()
         .map(Format::extension)
         .chain(["gif", "webp", "apng", "y4m", "mp4", "webm", "glb", "usda"]);
-    if !args.out.is_dir() && known.into_iter().any(is_file) {
+    if !args.out.is_dir() && known.into_iter().any(is_file) && one_picture::format(args).is_none() {
         let name = args.out.with_extension("");
-        let one = if args.shared.at.is_some() { "" } else { ", or `--at T` for one frame" };
+        let one = match format.content() {
+            Content::Mesh => "",
+            _ => ", or `--at T` for one frame in a file",
+        };
         return Err(usage(format!(
             "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj{one}; a whole film in one file is --format webp, apng, gif, y4m or asvg",
             args.out.display(),
@@ -152,7 +161,7 @@ pub fn spacing(args: &RenderArgs) -> Spacing {
 
 /// The values that all frames share; `picture` is the area of the page.
 pub fn fit(args: &RenderArgs, survey: &Survey, picture: impl Fn(&Fit) -> Picture) -> Result<Fit, Failure> {
-    let mut fit = match args.line_width {
+    let fit = match args.line_width {
         None => survey.fit(),
         Some(LineWidth::Units(width)) => survey.fit_of_width(width),
         Some(LineWidth::Pixels(pixels)) => {
@@ -165,10 +174,19 @@ pub fn fit(args: &RenderArgs, survey: &Survey, picture: impl Fn(&Fit) -> Picture
             fit
         }
     };
-    if let Some(accuracy) = args.accuracy {
-        fit = fit.with_accuracy(accuracy);
-    }
-    Ok(fit)
+    let is_picture = match args.format {
+        RenderFormat::Frames(format) => format.content() != Content::Mesh,
+        RenderFormat::Film(_) | RenderFormat::Moving => true,
+        RenderFormat::Growth(_) => false,
+    };
+    Ok(match args.accuracy {
+        Some(accuracy) => fit.with_accuracy(accuracy),
+        None if is_picture => {
+            let page = page(args, picture(&fit))?;
+            fit.for_pictures(&survey.first_surroundings(), &page)
+        }
+        None => fit,
+    })
 }
 
 /// The size in which the plants of a scene are seen, if pictures of dots are taken by its camera.

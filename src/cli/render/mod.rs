@@ -9,6 +9,8 @@ pub(super) mod args;
 mod film;
 pub(super) mod flags;
 mod moving;
+pub(super) mod one_picture;
+pub(super) mod pace;
 mod shutter;
 mod turntable;
 mod watch;
@@ -135,11 +137,20 @@ pub fn render_run(
     let mut clock = run.clock;
     let threads = flags::threads(args);
     let album = Some(Album::default());
-    let mut render =
-        Render { args, format, run: &run, out: &args.out, threads, frames: Vec::new(), album, stale };
+    let single = one_picture::format(args);
+    single.map_or(Ok(()), |format| one_picture::spare_others(args, format))?;
+    // One picture is made in a folder of its own.
+    let folder = single.map(|_| tempfile::tempdir()).transpose();
+    let folder = folder.map_err(|error| Failure::Model(format!("error: no temporary folder: {error}\n")))?;
+    let out = folder.as_ref().map_or(&*args.out, |folder| folder.path());
+    let mut render = Render { args, format, run: &run, out, threads, frames: Vec::new(), album, stale };
     let survey = render.measure(survey, &mut clock)?;
     let fit = flags::fit(args, &survey, |fit| picture(args, &run, &render.frames, fit))?;
-    let (stats, written) = render.write(fit, &mut clock)?;
+    let (stats, mut written) = render.write(fit, &mut clock)?;
+    if let (Some(folder), Some(format)) = (&folder, single) {
+        one_picture::put(folder.path(), args, format)?;
+        written.names = args.out.display().to_string();
+    }
     run.write_stats(&args.shared, clock, stats)?;
     if args.quiet {
         return Ok(());

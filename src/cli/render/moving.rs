@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use super::super::one_file::{file_of, save, spare};
 use super::{
-    Failure, ModelRun, Orbit, Render, count_of, film, flags, out_error, out_of_directory, play, size_of,
-    turntable,
+    Failure, ModelRun, Orbit, Render, count_of, film, flags, out_error, out_of_directory, pace, play,
+    size_of, turntable,
 };
 use crate::cli::album::Album;
 use crate::cli::args::RenderArgs;
@@ -66,7 +66,7 @@ pub fn render_run(
     let fit = flags::fit(args, &survey, |fit| fit.picture)?;
     let mut writer = FrameWriter::new(render.format, fit);
     writer.page = flags::page(args, writer.page.picture)?;
-    let ends = film::ends(args, &run);
+    let ends = pace::ends(args, &run);
     let seconds = ends.last().copied().unwrap_or_default();
     let mut moving = Moving::new(ends);
     let mut progress = render.bar("writing", run.times.len());

@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::{Clock, Failure, FrameRecord, Render, brief, count_of, play_at, record, turntable};
+use crate::cli::common::step;
 use crate::cli::frame_source::Frame;
 use crate::render::{Exposure, FrameWriter, Positions};
 use crate::scene::Scene;
@@ -101,7 +102,7 @@ impl Moments {
         let Some(part) = render.args.shutter.filter(|part| *part > 0.0) else { return Ok(None) };
         let times = &render.run.times;
         let shared = &render.args.shared;
-        let open = match shared.step.or(render.run.session.model.frames.map(|frames| frames.step)) {
+        let open = match step(shared, &render.run.session) {
             _ if turntable::stands(times) => 0.0,
             Some(step) => part * step,
             None => {

@@ -23,8 +23,9 @@ pub fn stands(times: &[f64]) -> bool {
 }
 
 /// When each frame of a plant that stands still ends, in seconds; none of one that grows.
-pub fn ends(times: &[f64]) -> Option<Vec<f64>> {
-    stands(times).then(|| (1..=times.len()).map(|frame| frame as f64 / RATE).collect())
+pub fn ends(times: &[f64], fps: Option<f64>) -> Option<Vec<f64>> {
+    let rate = fps.unwrap_or(RATE);
+    stands(times).then(|| (1..=times.len()).map(|frame| frame as f64 / rate).collect())
 }
 
 /// The way of the camera.

@@ -15,6 +15,8 @@ pub struct Surroundings {
     pub camera: Option<Viewpoint>,
     /// Height of a rigid horizontal floor without end, in scene units (`ground`).
     pub floor: Option<f64>,
+    /// The colour of the floor, if it is declared.
+    pub floor_color: Option<Color>,
 }
 
 /// A camera in perspective.

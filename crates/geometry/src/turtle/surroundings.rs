@@ -16,6 +16,7 @@ pub fn surroundings(model: &Model, time: f64) -> Result<Surroundings, Error> {
     let mut found = Surroundings {
         sky: scenery.sky.map(|colors| colors.map(Color::hex)),
         floor: scenery.ground,
+        floor_color: scenery.ground_color.map(Color::hex),
         ..Surroundings::default()
     };
     if let Some((program, span)) = &scenery.light {

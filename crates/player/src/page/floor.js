@@ -10,7 +10,7 @@ const EARTH = "#a99a78";
 const EARTHY = 0.6;
 
 class Floor {
-  constructor(gl, { light, floor, extent, shaders }, shadows, compiled, option) {
+  constructor(gl, { light, floor, floorColor, extent, shaders }, shadows, compiled, option) {
     this.gl = gl;
     const before = option + shaders.shade;
     const program = (this.program = compiled(before + shaders.open + shaders.lawn, before + shaders.sun + shaders.floor));
@@ -40,7 +40,7 @@ class Floor {
     gl.uniform1f(set("height"), floor);
     gl.uniform1f(set("around"), around);
     gl.uniform1f(set("extent"), extent);
-    const earth = light?.sky ? channelsOf(EARTH).map((c, k) => EARTHY * c + (1 - EARTHY) * channelsOf(light.sky[1])[k]) : [-1, 0, 0];
+    const earth = floorColor ? channelsOf(floorColor) : light?.sky ? channelsOf(EARTH).map((c, k) => EARTHY * c + (1 - EARTHY) * channelsOf(light.sky[1])[k]) : [-1, 0, 0];
     gl.uniform3fv(set("earth"), earth);
     gl.uniform3fv(set("tint"), tintOf(light));
   }

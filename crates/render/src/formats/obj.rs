@@ -84,7 +84,7 @@ impl Exporter for Obj {
         let scene = scene.flattened();
         let mut palette = scene.palette.clone();
         if scene.surroundings.floor.is_some() {
-            palette.add("ground", Page::BACKGROUND);
+            palette.add("ground", scene.surroundings.floor_color.unwrap_or(Page::BACKGROUND));
         }
         let pictures = pictures(&palette);
         let library = Companion { name: MATERIALS.to_owned(), bytes: materials(&palette, &pictures) };

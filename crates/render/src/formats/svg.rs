@@ -24,7 +24,9 @@ impl Exporter for Svg {
         Drawing { scene, writer, title }: Drawing<'_>,
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
-        let (fit, page) = writer.fit.for_frame(scene, &writer.page);
+        let (mut fit, page) = writer.fit.for_frame(scene, &writer.page);
+        // A page of another shape than what is drawn shows more, such as a floor.
+        fit.picture = page.picture;
         let sky = Sky::of(scene, &fit, &page);
         let (scene, floor) = floor::added(scene, &fit, Some(&page));
         let style = Style { floor, memory: Some(&writer.memory), ..style(&fit, &page) };

@@ -98,6 +98,12 @@ impl Blend {
     }
 }
 
+/// How far from a bend a stem of this radius begins to turn, if it is long enough on both sides.
+pub(super) fn reach_of_bend(directions: [Vector; 2], radius: f64) -> f64 {
+    let half = (directions[0] - directions[1]).norm() / 2.0;
+    ROUNDING * radius * half / (1.0 - half * half).max(1e-6).sqrt()
+}
+
 impl Chain<'_> {
     /// Cuts the chain; plain ones into their segments as they are. `grown`: with blends and round bends.
     pub(super) fn parts(&self, grown: bool, collar: Option<&Collar>, out: &mut Vec<Part>) {
@@ -228,8 +234,7 @@ impl Chain<'_> {
             let on = bound(Some(k + 1).filter(|k| *k < turns.len()), self.members.len()) - arcs[i];
             let directions = self.directions_at(i);
             let half = (directions[0] - directions[1]).norm() / 2.0;
-            let tangent = half / (1.0 - half * half).max(1e-6).sqrt();
-            let reach = (ROUNDING * a.max(b) * tangent).min(0.5 * back).min(0.5 * on);
+            let reach = reach_of_bend(directions, a.max(b)).min(0.5 * back).min(0.5 * on);
             let point = self.segments[self.members[i]].start;
             // A piece turns by 8 degrees at most.
             let pieces = (half.asin().to_degrees() / 8.0).ceil().max(1.0);

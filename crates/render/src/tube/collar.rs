@@ -15,6 +15,10 @@ use dlsys_geometry::scene::{Point, Vector};
 /// Height of a collar at a right angle, in parts of the branch's radius, and its length, in parts of the height.
 const HEIGHT: f64 = 0.5;
 const LENGTH: f64 = 3.2;
+/// The same of a foot on the ground: a hint of roots that is no plinth under a pole. A foot is no longer than this part of its stem.
+const FOOT: f64 = 0.16;
+const FOOT_LENGTH: f64 = 10.0;
+const FOOT_OF_STEM: f64 = 0.25;
 /// Sines of the angle to the parent from which a collar appears, and from which it has its height: a branch that leaves
 /// along its parent comes out of it slowly.
 const FROM: f64 = 0.17;
@@ -111,10 +115,15 @@ impl Collar {
         })
     }
 
-    /// The foot of a stem that stands on the ground at this height.
-    pub(super) fn of_foot(joint: Point, direction: Vector, radius: f64, ground: f64) -> Collar {
-        let height = 1.2 * HEIGHT * radius;
-        let length = LENGTH * height;
+    /// The foot of a stem that stands on the ground at this height, and goes on straight and evenly for this length.
+    pub(super) fn of_foot(
+        joint: Point,
+        direction: Vector,
+        radius: f64,
+        (ground, even): (f64, f64),
+    ) -> Collar {
+        let length = (FOOT_LENGTH * FOOT * radius).min(FOOT_OF_STEM * even);
+        let height = length / FOOT_LENGTH;
         let sin = direction.y.max(0.5);
         let (low, cos) = (ground - joint.y, (1.0 - sin * sin).max(0.0).sqrt());
         let between = [(low - radius * cos) / sin, (low + length + radius * cos) / sin].map(|s| s.max(0.0));

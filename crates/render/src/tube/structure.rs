@@ -1,7 +1,11 @@
 //! How the segments of a scene hang together: which of them share a ring, and how each tube begins.
 
-use super::{Begin, Collar, NONE, TubeStyle, can_join};
+use super::{Begin, Collar, NONE, TubeStyle, can_join, chain};
 use dlsys_geometry::scene::{Scene, Segment};
+
+/// A branch is wider than what goes on along the axis, or than the end of an axis, from these ratios on.
+const TAKES_OVER: f64 = 1.02;
+const TAKES_THE_END: f64 = 1.001;
 
 /// How segments hang together.
 pub(super) struct Structure {
@@ -11,10 +15,18 @@ pub(super) struct Structure {
     /// The segment that goes on from the end of each on the same axis, with or without a common ring, or `NONE`.
     ahead: Vec<usize>,
     pub(super) continues: Vec<bool>,
+    /// The segment that each leaves as a branch does, although it goes on along its axis, or `NONE`; none if that happens nowhere.
+    leaves: Vec<usize>,
 }
 
 impl Structure {
-    pub(super) fn of(segments: &[Segment], default_width: f64, kept: impl Fn(usize) -> bool) -> Structure {
+    /// Of the segments that are to be `kept`; `grown`: branches may take over.
+    pub(super) fn of(
+        segments: &[Segment],
+        default_width: f64,
+        grown: bool,
+        kept: impl Fn(usize) -> bool,
+    ) -> Structure {
         let radii: Vec<[f64; 2]> =
             segments.iter().map(|s| s.widths.map(|w| w.resolve(default_width) / 2.0)).collect();
         let mut next = vec![NONE; segments.len()];
@@ -35,7 +47,73 @@ impl Structure {
                 continues[i] = true;
             }
         }
-        Structure { radii, next, ahead, continues }
+        let mut structure = Structure { radii, next, ahead, continues, leaves: Vec::new() };
+        if grown {
+            structure.give_way(segments, kept);
+        }
+        structure
+    }
+
+    /// Where a branch is wider than what goes on along the axis, the branch is the smooth continuation, and the axis comes out of it in a
+    /// collar. One that is wider than the axis ever was is no limb of it, but an organ.
+    fn give_way(&mut self, segments: &[Segment], kept: impl Fn(usize) -> bool) {
+        let mut widest: Vec<f64> = Vec::with_capacity(segments.len());
+        let mut branches: Vec<usize> = vec![NONE; segments.len()];
+        for (i, segment) in segments.iter().enumerate() {
+            let own = self.radii[i][0].max(self.radii[i][1]);
+            widest.push(segment.follows.map_or(own, |before| own.max(widest[before])));
+            let Some(parent) = segment.grows_from.filter(|_| segment.follows.is_none()) else { continue };
+            let known = branches[parent];
+            if kept(i) && kept(parent) && (known == NONE || self.radii[i][0] > self.radii[known][0]) {
+                branches[parent] = i;
+            }
+        }
+        for (parent, &branch) in branches.iter().enumerate().filter(|(_, branch)| **branch != NONE) {
+            let axis = self.ahead[parent];
+            let (end, width) = (self.radii[parent][1], self.radii[branch][0]);
+            let on = if axis == NONE { 0.0 } else { self.radii[axis][0] };
+            let is_wider = if on > 0.0 { width > TAKES_OVER * on } else { width > TAKES_THE_END * end };
+            let (from, to) = (&segments[parent], &segments[branch]);
+            if !is_wider
+                || end <= 0.0
+                || width > TAKES_THE_END * widest[parent]
+                || from.contour != to.contour
+                || !can_join(from, to, [end, width])
+            {
+                continue;
+            }
+            if axis != NONE {
+                self.leaves.resize(segments.len(), NONE);
+                self.leaves[axis] = parent;
+                self.continues[axis] = false;
+            }
+            (self.next[parent], self.ahead[parent], self.continues[branch]) = (branch, branch, true);
+        }
+    }
+
+    /// The segment that this one comes out of as a branch.
+    fn parent(&self, segments: &[Segment], i: usize) -> Option<usize> {
+        match segments[i].follows {
+            None => segments[i].grows_from,
+            Some(_) => self.leaves.get(i).copied().filter(|parent| *parent != NONE),
+        }
+    }
+
+    /// How far before its start a tube is to begin whose first segment this is. An axis that leaves its stem where that bends away begins
+    /// where the stem is still straight, within it.
+    pub(super) fn before(&self, segments: &[Segment], first: usize) -> f64 {
+        let parent = self.leaves.get(first).copied().filter(|parent| *parent != NONE);
+        let Some(parent) = parent else { return 0.0 };
+        let along = segments[parent].direction;
+        let wide = self.radii[parent][1].max(self.radii[self.ahead[parent]][0]);
+        let wanted = chain::reach_of_bend([along, segments[self.ahead[parent]].direction], wide) + wide;
+        let (mut straight, mut at) = (0.0, parent);
+        while straight < wanted && segments[at].direction.cross(&along).norm() < 1e-6 {
+            straight += (segments[at].end - segments[at].start).norm();
+            let Some(before) = segments[at].follows else { break };
+            at = before;
+        }
+        wanted.min(straight)
     }
 
     pub(super) fn is_visible(&self, i: usize) -> bool {
@@ -51,12 +129,15 @@ impl Structure {
     ) -> (Begin, Option<Collar>) {
         let segment = &scene.segments[first];
         let (start, radius) = (segment.start, self.radii[first][0]);
-        if radius <= 0.0 || segment.follows.is_some() {
+        let parent = self.parent(&scene.segments, first);
+        if radius <= 0.0 || segment.follows.is_some() && parent.is_none() {
             return (Begin::Dome, None);
         }
-        if let Some(parent) = segment.grows_from {
-            let thickness = self.radii[parent][1];
+        if let Some(parent) = parent {
             let ahead = Some(self.ahead[parent]).filter(|&i| i != NONE && self.radii[i][0] > 0.0);
+            // A stem that gets wider at the joint is as wide there as what goes on.
+            let joined = ahead.filter(|&i| self.next[parent] == i).map_or(0.0, |i| self.radii[i][0]);
+            let thickness = self.radii[parent][1].max(joined);
             let ahead = ahead.map(|i| (scene.segments[i].direction, self.radii[i][0]));
             let back = (scene.segments[parent].direction, thickness);
             let collar =
@@ -69,7 +150,26 @@ impl Structure {
         if (start.y - ground).abs() > 1e-6 * radius || segment.direction.y < 0.5 {
             return (Begin::Dome, None);
         }
-        let foot = style.floor.map(|_| Collar::of_foot(start, segment.direction, radius, ground));
+        let even = self.even_length(&scene.segments, first);
+        let floor = style.floor.filter(|_| even > 0.0);
+        let foot = floor.map(|_| Collar::of_foot(start, segment.direction, radius, (ground, even)));
         (Begin::Flat, foot)
+    }
+
+    /// For how long a stem goes on straight and without a step in its width.
+    fn even_length(&self, segments: &[Segment], first: usize) -> f64 {
+        let along = segments[first].direction;
+        let (mut length, mut at) = (0.0, first);
+        loop {
+            length += (segments[at].end - segments[at].start).norm();
+            let next = self.next[at];
+            if next == NONE
+                || segments[next].direction.cross(&along).norm() > 1e-6
+                || (self.radii[next][0] - self.radii[at][1]).abs() > 1e-9 * self.radii[at][1]
+            {
+                return length;
+            }
+            at = next;
+        }
     }
 }

@@ -12,7 +12,7 @@ use crate::detect::signs::NEAR;
 use crate::error::Error;
 use crate::world::state::{Signs, Switches};
 use dlsys_expr::Dual;
-use dlsys_model::{Condition, ConditionStep, Remedy, Rule, Sign, Truth};
+use dlsys_model::{Condition, ConditionStep, Remedy, Rule, Sign, Truth, ZeroCrossing};
 use dlsys_tree::ModuleId;
 
 /// Most times that the equations at one instant are chosen anew before the choice is called chattering.
@@ -292,7 +292,14 @@ impl EventStage<'_, '_> {
                 if alone.judge(|i| missing.signs[i]) == Truth::No
                     && !failing.iter().any(|(s, _)| *s == rule.atoms[atom])
                 {
-                    let sign = if meet(atom) { Sign::Zero } else { missing.signs[atom] };
+                    // A difference that never changes may be beyond the boundary as well.
+                    let moves = !matches!(solve.zero_crossings[atom], ZeroCrossing::Constant);
+                    let sign = match missing.signs[atom] {
+                        Sign::Undefined => Sign::Undefined,
+                        _ if !moves => Sign::Any,
+                        _ if meet(atom) => Sign::Zero,
+                        sign => sign,
+                    };
                     let remedy = Remedy::new(&self.setup.model.kinds, rule, atom, comparison, sign);
                     failing.push((rule.atoms[atom], remedy));
                 }

@@ -23,6 +23,9 @@ pub(super) fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<Str
     if let Some(advice) = advice::for_scene(item, &text[..at], found, &text[at..]) {
         return Some(advice);
     }
+    if let Some(advice) = hint_of_sign(item, text, at, found) {
+        return Some(advice);
+    }
     if let Some(advice) = hint_of_group(item, &text[..at], found) {
         return Some(advice.to_owned());
     }
@@ -33,6 +36,23 @@ pub(super) fn hint(item: Rule, text: &str, at: usize, found: &str) -> Option<Str
         return Some(advice.to_owned());
     }
     hint_by_symbol(item, text, at, found).or_else(|| hint_by_word(item, text, at, found))
+}
+
+/// Hints for declarations that have a value and no name, with a sign before the value: the line as it is to be.
+fn hint_of_sign(item: Rule, text: &str, at: usize, found: &str) -> Option<String> {
+    let has_value = matches!(
+        item,
+        Rule::angle_item | Rule::period_item | Rule::ground_item | Rule::light_item | Rule::sky_item
+    );
+    let word = text[..at].trim();
+    let is_alone = !word.is_empty() && word.chars().all(char::is_alphabetic);
+    if !has_value || !is_alone || !matches!(found, ":" | "=") {
+        return None;
+    }
+    let value = text[at + found.len()..].lines().next().unwrap_or_default();
+    let value = value.split('#').next().filter(|_| !value.contains('"')).unwrap_or(value).trim();
+    let is_short = !value.is_empty() && value.len() < 60 && !value.starts_with([':', '=']);
+    is_short.then(|| format!("without `{found}`: write `{word} {value}`"))
 }
 
 /// Hints for repetitions and conditions in strings.
@@ -73,7 +93,15 @@ fn hint_of_group(item: Rule, before: &str, found: &str) -> Option<&'static str> 
 fn hint_of_symbol(item: Rule, before: &str, rest: &str) -> Option<String> {
     let in_step = item == Rule::step_item && (before.contains("->") || before.contains('→'));
     let after_symbol = before.ends_with(|c: char| !(c.is_alphanumeric() || c == ')' || c.is_whitespace()));
-    (in_step || in_string(item, before)).then(|| foreign_syntax::symbol(rest, after_symbol)).flatten()
+    if !in_step && !in_string(item, before) {
+        return None;
+    }
+    let number = &rest[..rest.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(rest.len())];
+    let is_number = number.starts_with(|c: char| c.is_ascii_digit());
+    match before.chars().next_back().filter(|c| is_number && "+-&^\\/|!;".contains(*c)) {
+        Some(symbol) => Some(format!("a parameter stands in parentheses: `{symbol}({number})`")),
+        None => foreign_syntax::symbol(rest, after_symbol),
+    }
 }
 
 /// Hints for successors with weights and for events at a rate.
@@ -173,6 +201,9 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         }
         (_, "-" | "=") if item == Rule::frames_item => "frames are written `frames 0 .. 10 step 0.1`",
         (_, "=") if item == Rule::angle_item => "the angle is written `angle 45`",
+        (_, "step") if item == Rule::param_item => {
+            "a `param` has a range and no step: any value in it can be chosen: `param r = 1 in 0 .. 10`"
+        }
         (_, ":") if matches!(item, Rule::ignore_item | Rule::consider_item) => {
             "names stand behind the word, without a colon: `ignore F_x @L`; turns and other symbols are passed over anyway"
         }
@@ -322,7 +353,9 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
             "this word begins a clause of a rule; if the line before it is the head of a rule, it ends with `:`"
         }
         "else" if in_rule => "every clause has a condition of its own: `if … solve …`, `if … produce …`",
-        "if" if in_rule => "after its condition a clause has `solve` or `produce`",
+        "if" if in_rule => {
+            "after its condition a clause has `solve` or `produce`; the condition stands before them: `if x < 1 solve dx/dt = 1`"
+        }
         _ if ended && before.ends_with(['+', '-', '*', '/', '^', '=', '<', '>', '&', '|']) => {
             "an operator has something on both sides: add what is missing, or remove the sign"
         }
@@ -351,6 +384,9 @@ fn hint_by_word(item: Rule, text: &str, at: usize, found: &str) -> Option<String
         _ if is_word || found == "(" => {
             if let Some(help) = keyword_hint(found, &["if", "then", "else", "solve", "produce"]) {
                 return Some(help);
+            }
+            if dlsys_expr::Unary::NAMED.iter().any(|(name, _)| *name == last_word) && is_word {
+                return Some(format!("arguments stand in parentheses: `{last_word}({found})`"));
             }
             if last_word.starts_with(|c: char| c.is_alphanumeric()) && line.contains(['=', '<', '>']) {
                 "to multiply, write `*`: `2*x`, `r*x`"
