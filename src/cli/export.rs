@@ -135,14 +135,14 @@ pub fn render_run(
 
 /// The flags of `render`; those for pictures are refused.
 fn order_of(args: &RenderArgs, format: interchange::Format) -> Result<Order<'_>, Failure> {
-    let in_a_plane = [("--view", args.view.is_some()), ("--layout", args.layout != Layout::Frames)];
-    let pictures: Vec<_> = in_a_plane.into_iter().chain(of_pictures(args)).collect();
-    refuse(format, &pictures, "the file is a plant in space, and the program that shows it has a camera")?;
     refuse(
         format,
         &[("--fps", args.fps.is_some())],
         "the program that plays the file has a rate of its own",
     )?;
+    let in_a_plane = [("--view", args.view.is_some()), ("--layout", args.layout != Layout::Frames)];
+    let pictures: Vec<_> = in_a_plane.into_iter().chain(of_pictures(args)).collect();
+    refuse(format, &pictures, "the file is a plant in space, and the program that shows it has a camera")?;
     refuse(format, &[("--seeds", args.seeds.is_some())], "a file holds one growing plant")?;
     Ok(Order {
         format,

@@ -28,6 +28,8 @@ const LEAST: f64 = 256.0;
 const COARSE: f64 = 128.0;
 /// The sun has a second map if that is so many times as fine.
 const FINER: f64 = 1.5;
+/// Cells of the coarse map by which the finer one reaches beyond what stands on the ground.
+const EDGE: f64 = 3.5;
 /// The maps of the sky leave out ground that reaches so many times as far as what stands on it, but for a rim, in parts of the
 /// larger side, in which its shadows fade.
 const FURTHER: f64 = 2.0;
@@ -282,7 +284,9 @@ impl Maps {
         // The sun's maps are the largest, and first.
         let of_sun = sun.map(|sun| {
             let whole = Map::new(middle, around, sun, scale, FINEST);
-            let close = (core != around).then(|| Map::new(middle, core, sun, scale, FINEST));
+            // What is beyond the finer map is in the shadow of ground alone: the edges of other shadows are wider in the coarse one.
+            let wide = [core[0], core[1].add_scalar(EDGE / whole.scale)];
+            let close = (core != around).then(|| Map::new(middle, wide, sun, scale, FINEST));
             close.filter(|close| close.scale > FINER * whole.scale).into_iter().chain([whole]).collect()
         });
         let mut maps: Vec<Map> = of_sun.unwrap_or_default();

@@ -186,7 +186,7 @@ fn a_branch_that_takes_over_is_the_smooth_continuation() {
         let owner = scene.segments[1].owner;
         for face in whole.faces.iter().filter(|face| face.owner == owner) {
             for at in face.corners.map(|(vertex, _)| whole.vertices[vertex as usize]) {
-                assert!(at.x > -0.57 * trunk, "{branch} {axis}: {at}");
+                assert!(at.x > -0.6 * trunk && at.y > 3.0 - 0.35 * branch, "{branch} {axis}: {at}");
             }
         }
     }
