@@ -161,11 +161,11 @@ fn feet_are_flat_and_flare_on_a_floor() {
     assert!(low.abs() < 1e-9 && (0.55..0.6).contains(&wide), "{low} {wide}");
 }
 
-/// A trunk, cut into pieces, with a branch and the axis that goes on; all of them with these widths.
+/// A trunk, cut into pieces, with a branch and the axis that goes on; all of them with these widths. It has depth: flat drawings are not grown.
 fn fork(pieces: usize, [trunk, branch, axis]: [f64; 3]) -> Scene {
     let mut scene = Scene::default();
     let below = stem(&mut scene, (Point::origin(), None), &[(Vector::y() * 3.0, trunk)], pieces);
-    stem(&mut scene, below, &[(Vector::new(1.5, 1.3, 0.0), branch)], pieces);
+    stem(&mut scene, below, &[(Vector::new(1.5, 1.3, 0.5), branch)], pieces);
     let first = scene.segments.len();
     stem(&mut scene, below, &[(Vector::y() * 2.0, axis)], pieces);
     (scene.segments[first].follows, scene.segments[first].grows_from) = (below.1, None);
