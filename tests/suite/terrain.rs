@@ -9,6 +9,7 @@ use dlsys::sim::Settings;
 use dlsys::surround::Terrain;
 use dlsys::tree::ModuleString;
 
+use crate::cli::dlsys;
 use crate::glb::follow;
 use crate::glb_reader::{Glb, Shown};
 use crate::usd_reader::Usd;
@@ -133,14 +134,14 @@ fn pictures_and_files_have_the_ground() {
 #[test]
 fn ground_alone_is_seen_as_it_is() {
     let text = CONE.replace("F(0.01)", "A") + "camera at 0, 1, 0.01 towards 0, 0, 0 angle 40\n";
-    let session = session(&text);
-    let picture = |time: f64| {
-        let scene = drawn(&session, time);
-        let mut survey = Survey::new(View::FRONT);
-        survey.add(&scene);
-        FrameWriter::new(Format::PNG, survey.fit()).write(&scene, "heap")
-    };
-    assert_ne!(picture(0.0), picture(1.0));
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    std::fs::write(path("heap.dls"), text).expect("written");
+    let (model, out) = (path("heap.dls"), path("out"));
+    let done = dlsys(&["render", &model, "--at", "0,1", "--format", "png", "--size", "60x40", "-o", &out]);
+    assert!(done.status.success(), "{done:?}");
+    let frame = |n: usize| std::fs::read(path(&format!("out/frame-000{n}.png"))).expect("a frame");
+    assert!(frame(0) != frame(1), "the heap is seen");
 }
 
 /// The report on a scene with soil: errors that fall with the width of columns, and no volume from nowhere.
@@ -155,9 +156,9 @@ fn errors_of_ground_are_measured_by_the_width_of_columns_and_by_ticks() {
         assert_eq!((outcomes.len(), outcomes[3].misplaced, outcomes[3].height), (4, 0.0, 0.0));
         assert!(outcomes[0].misplaced > 0.0 && outcomes.iter().all(|outcome| outcome.imbalance == 0));
     }
-    let [coarse, _, fine, _] = [0, 1, 2, 3].map(|n| study.by_cell[n].result.clone().expect("a run"));
+    let [coarse, _, fine, finest] = [0, 1, 2, 3].map(|n| study.by_cell[n].result.clone().expect("a run"));
     assert!(fine.misplaced < 0.5 * coarse.misplaced, "{coarse:?} {fine:?}");
-    assert!(fine.updates > 4 * coarse.updates);
+    assert!(finest.updates > 4 * coarse.updates, "{coarse:?} {finest:?}");
     let table = dlsys::study::soil_table(&study);
     assert!(table.contains("misplaced") && table.contains("the reference"), "{table}");
     // Rules that read the ground would grow otherwise on other columns.

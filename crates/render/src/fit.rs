@@ -347,8 +347,15 @@ impl Fit {
         let ends =
             |low: f64, high: f64, shift: f64| [low - reach + shift.min(0.0), high + reach + shift.max(0.0)];
         let (xs, zs) = (ends(low.x, high.x, shift[0]), ends(low.z, high.z, shift[1]));
-        let corners = xs.into_iter().flat_map(|x| zs.map(|z| self.camera.project(Point::new(x, floor, z))));
-        Some(corners.fold(frame, |[left, bottom, right, top], at| {
+        let corners: Vec<_> =
+            (xs.into_iter()).flat_map(|x| zs.map(|z| self.camera.project(Point::new(x, floor, z)))).collect();
+        // A floor that is seen along itself shows no shade.
+        let heights = corners.iter().map(|at| at.y);
+        let tall = heights.clone().fold(f64::MIN, f64::max) - heights.fold(f64::MAX, f64::min);
+        if tall <= 1e-9 * (high.x - low.x).max(high.z - low.z) {
+            return Some(frame);
+        }
+        Some(corners.into_iter().fold(frame, |[left, bottom, right, top], at| {
             [left.min(at.x), bottom.min(at.y), right.max(at.x), top.max(at.y)]
         }))
     }
