@@ -146,21 +146,30 @@ fn passive(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Res
         progress.inc();
     });
     drop(progress);
-    let study = match study {
-        Ok(Some(study)) => study,
+    let file = format!("{name}-scene.csv");
+    let texts =
+        study.map(|study| study.map(|study| [study::passive_table(&study), study::passive_csv(&study)]));
+    passive_result(args, "what falls and hangs: no run came to the last time", &file, texts)
+}
+
+/// Prints the table of a passive part of a scene, and writes its data; or the reason why there is none: growth has been studied all the same.
+fn passive_result(
+    args: &ReportArgs,
+    failure: &str,
+    file: &str,
+    texts: Result<Option<[String; 2]>, impl std::fmt::Display>,
+) -> Result<(), Failure> {
+    let [table, data] = match texts {
+        Ok(Some(texts)) => texts,
         Ok(None) => return Ok(()),
-        // Growth has been studied all the same.
         Err(why) => {
             return print(&format!(
-                "\nwhat falls and hangs: no run came to the last time\n  {why}\n  (`--time-limit S` gives each run more time, `--at` fewer)\n"
+                "\n{failure}\n  {why}\n  (`--time-limit S` gives each run more time, `--at` fewer)\n"
             ));
         }
     };
-    print(&study::passive_table(&study))?;
-    match &args.out {
-        Some(out) => write(out, &format!("{name}-scene.csv"), &study::passive_csv(&study)),
-        None => Ok(()),
-    }
+    print(&table)?;
+    args.out.as_ref().map_or(Ok(()), |out| write(out, file, &data))
 }
 
 /// Studies the sizes of columns and of ticks on a scene with ground that gives way.
@@ -171,21 +180,9 @@ fn soils(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Resul
         progress.inc();
     });
     drop(progress);
-    let study = match study {
-        Ok(Some(study)) => study,
-        Ok(None) => return Ok(()),
-        // Growth has been studied all the same.
-        Err(why) => {
-            return print(&format!(
-                "\nground: it does not come to the last time\n  {why}\n  (`--time-limit S` gives each run more time, `--at` fewer)\n"
-            ));
-        }
-    };
-    print(&study::soil_table(&study))?;
-    match &args.out {
-        Some(out) => write(out, &format!("{name}-ground.csv"), &study::soil_csv(&study)),
-        None => Ok(()),
-    }
+    let file = format!("{name}-ground.csv");
+    let texts = study.map(|study| study.map(|study| [study::soil_table(&study), study::soil_csv(&study)]));
+    passive_result(args, "ground: it does not come to the last time", &file, texts)
 }
 
 /// Seeds over which statistics of the wind are averaged.
