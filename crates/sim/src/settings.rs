@@ -118,6 +118,9 @@ pub struct Settings {
     pub max_memory: u64,
     /// Threads that compute the lives of modules that read no others. Results do not depend on it.
     pub threads: usize,
+    /// Modules from which on threads share them: the lives of fewer are computed before threads have begun (differential tests).
+    #[doc(hidden)]
+    pub threads_from: usize,
     /// Productions are recorded for [`Simulation::take_events`].
     pub log: bool,
     /// Disables the fast path (differential tests).
@@ -145,6 +148,7 @@ impl Default for Settings {
             max_seconds: f64::INFINITY,
             max_memory: u64::MAX,
             threads: 1,
+            threads_from: 1 << 14,
             log: false,
             slow: false,
             transitions: false,

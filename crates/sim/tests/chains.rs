@@ -138,7 +138,7 @@ fn compare(text: &str, settings: Settings, times: &[f64], threads: &[usize]) -> 
     let mut least = u64::MAX;
     for &threads in threads {
         let way = if threads == 2 { Way::Pieces } else { Way::Chains };
-        let (chains, chained) = run(&session, Settings { threads, ..settings }, times, way);
+        let (chains, chained) = run(&session, Settings { threads, threads_from: 0, ..settings }, times, way);
         assert_eq!(queue.2, chains.2, "{threads} threads, {text}");
         for (i, (a, b)) in queue.1.iter().zip(&chains.1).enumerate() {
             assert_eq!(a, b, "production {i}, {threads} threads, of\n{text}");

@@ -110,7 +110,7 @@ impl Simulation<'_> {
             return false;
         }
         let (since, before) = self.chains.mark;
-        let least = (LEAST * setup.settings.threads.max(1)).min(MOST);
+        let least = (LEAST * self.threads().max(1)).min(MOST);
         let wanted = (4 * self.schedule.lazy_entries()).clamp(least, MOST).min(room as usize / 2);
         let pace = now.since(since) / (events - before).max(1) as f64;
         let length = self.chains.length.unwrap_or(pace * wanted as f64);
@@ -138,6 +138,12 @@ impl Simulation<'_> {
         true
     }
 
+    /// Threads that are worth their beginning for the modules there are.
+    fn threads(&self) -> usize {
+        let settings = &self.setup.settings;
+        if self.world.tree.len() < settings.threads_from { 1 } else { settings.threads }
+    }
+
     /// Plans for the chains up to a time, or to an earlier one, with their productions sorted. They are complete: what is in them has left
     /// the queue. None if there are none with enough productions.
     fn plan_chains(&mut self, until: f64, room: u64) -> Option<Planned> {
@@ -154,7 +160,7 @@ impl Simulation<'_> {
             }
         }
         let (tree, lives, logs) = (&self.world.tree, &self.world.lives, self.log.records());
-        let threads = self.setup.settings.threads;
+        let threads = self.threads();
         let mut later = Vec::new();
         for _ in 0..TRIALS {
             later.extend(entries.extract_if(.., |(time, _)| *time >= limit));
