@@ -5,9 +5,9 @@ use dlsys_geometry::scene::{Vector, sin_cos_degrees};
 /// Sides of a prism whose faces are no further from its cylinder than that. Few numbers are used, so that a
 /// stem that grows does not change all the time.
 pub(crate) fn sides_for(radius: f64, accuracy: f64) -> usize {
-    // With the last, a face is five parts in a million of the radius from its cylinder, which shows only where the picture has a small part of a stem; and a
-    // round end has half a million triangles.
-    const STEPS: [usize; 15] = [8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024];
+    // With the last, a face is two parts in a hundred thousand of the radius from its cylinder, which shows only where the picture has a small part of a stem;
+    // and a round end has more than a hundred thousand triangles.
+    const STEPS: [usize; 13] = [8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512];
     let deviation = |sides: usize| radius * (1.0 - sin_cos_degrees(180.0 / sides as f64).1);
     STEPS.into_iter().find(|&sides| deviation(sides) <= accuracy).unwrap_or(STEPS[STEPS.len() - 1])
 }
