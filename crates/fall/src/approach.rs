@@ -4,7 +4,7 @@
 //! of both go on along the axis of their nearest pair with their present velocities, up to half a bound of their accelerations times the square of the time. So
 //! they cannot meet before an instant that follows from that, whatever their speed; there the axis is found again.
 
-use dlsys_solid::{Meeting, Shape};
+use dlsys_solid::Meeting;
 
 use crate::fall::Rules;
 use crate::pairs::at;
@@ -32,8 +32,9 @@ pub(crate) struct Front {
 }
 
 impl Front {
-    fn of_body(rules: &Rules, motion: &Motion, part: &Shape) -> Front {
-        let points = rules.core(motion, part);
+    /// Of points in the axes of a body.
+    fn of_body(motion: &Motion, core: &[Vector]) -> Front {
+        let points: Vec<Vector> = core.iter().map(|point| motion.point(*point)).collect();
         let spin = motion.world_spin();
         let velocity = |point: &Vector| motion.velocity + spin.cross(&(point - motion.position));
         Front { velocities: points.iter().map(velocity).collect(), points }
@@ -77,7 +78,7 @@ impl Rules {
                         Front { velocities: points.iter().map(velocity).collect(), points }
                     };
                     let width = self.distance(part, shape);
-                    let found = self.pass_by(step, part, (width, &place), (bend, until), (depth, sunk));
+                    let found = pass_by(step, part.core(), (width, &place), (bend, until), (depth, sunk));
                     if found != Touch::Nothing {
                         first = found;
                     }
@@ -86,42 +87,41 @@ impl Rules {
         }
         first
     }
+}
 
-    /// When a part of the body first comes nearer than a width to points that move, up to a time.
-    pub(crate) fn pass_by(
-        &self,
-        step: &Step,
-        part: &Shape,
-        (mut width, other): (f64, &dyn Fn(f64) -> Front),
-        (bend, until): (f64, f64),
-        (depth, sunk): (f64, bool),
-    ) -> Touch {
-        let mut time = step.start;
-        for instant in 0..INSTANTS {
-            let own = Front::of_body(self, &step.at(time), part);
-            let other = other(time);
-            let way = Meeting::of(&own.points, &other.points).way;
-            let distance = way.norm();
-            if instant == 0 && sunk {
-                width = width.min(distance);
-                // Nearly as deep as the cores: it cannot get deeper.
-                if width <= depth {
-                    return Touch::Nothing;
-                }
-            }
-            if distance - width < -0.5 * depth || distance == 0.0 {
-                return Touch::At(time);
-            }
-            let axis = way / distance;
-            let left = until - time;
-            let clear = clear_time([&own, &other], &axis, (width - 0.75 * depth, 0.05 * depth), (bend, left));
-            if clear >= left {
+/// When points of the body (in its axes) first come nearer than a width to points that move, up to a time.
+pub(crate) fn pass_by(
+    step: &Step,
+    core: &[Vector],
+    (mut width, other): (f64, &dyn Fn(f64) -> Front),
+    (bend, until): (f64, f64),
+    (depth, sunk): (f64, bool),
+) -> Touch {
+    let mut time = step.start;
+    for instant in 0..INSTANTS {
+        let own = Front::of_body(&step.at(time), core);
+        let other = other(time);
+        let way = Meeting::of(&own.points, &other.points).way;
+        let distance = way.norm();
+        if instant == 0 && sunk {
+            width = width.min(distance);
+            // Nearly as deep as the cores: it cannot get deeper.
+            if width <= depth {
                 return Touch::Nothing;
             }
-            time += clear;
         }
-        Touch::Until(time)
+        if distance - width < -0.5 * depth || distance == 0.0 {
+            return Touch::At(time);
+        }
+        let axis = way / distance;
+        let left = until - time;
+        let clear = clear_time([&own, &other], &axis, (width - 0.75 * depth, 0.05 * depth), (bend, left));
+        if clear >= left {
+            return Touch::Nothing;
+        }
+        time += clear;
     }
+    Touch::Until(time)
 }
 
 /// The time for which two fronts surely stay apart by a width along an axis, up to an error of it; at most `left`.

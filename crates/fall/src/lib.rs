@@ -56,6 +56,7 @@ mod fall;
 mod forces;
 mod ground;
 mod impulse;
+mod manifold;
 mod motion;
 mod obstacles;
 mod pairs;

@@ -7,21 +7,20 @@ use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
-use dlsys_solid::{Meeting, Shape};
+use dlsys_solid::Shape;
 
-use crate::approach::{Front, Touch};
+use crate::approach::{Front, Touch, pass_by};
 use crate::error::check;
 use crate::fall::Rules;
-use crate::ground::GROUND;
-use crate::pairs::{Facing, SKIN};
+use crate::manifold::{Apart, Ridge, ridges};
+use crate::pairs::SKIN;
 use crate::step::Step;
 use crate::{Error, Motion, Surface, Vector};
 
 /// Most columns below a body.
 pub(crate) const MOST_COLUMNS: i64 = 250_000;
-/// Rounding of places in parts of a cell, and of directions.
+/// Rounding of places in parts of a cell.
 const ROUNDING: f64 = 1e-9;
-const TILT: f64 = 1e-6;
 
 /// Heights of columns on a grid of squares.
 pub trait Columns: fmt::Debug + Send + Sync {
@@ -93,7 +92,7 @@ pub(crate) struct Relief {
 #[derive(Clone, Debug)]
 pub(crate) struct Face {
     pub(crate) corners: [Vector; 3],
-    up: Vector,
+    pub(crate) up: Vector,
 }
 
 impl Face {
@@ -121,8 +120,18 @@ impl Face {
         points.iter().map(|point| -self.depth(point)).fold(f64::INFINITY, f64::min)
     }
 
+    /// False for most points that are not within a distance.
+    fn is_near(&self, point: &Vector, distance: f64) -> bool {
+        let within = |along: fn(&Vector) -> f64| {
+            let [a, b, c] = [0, 1, 2].map(|k| along(&self.corners[k]));
+            let at = along(point);
+            at >= a.min(b).min(c) - distance && at <= a.max(b).max(c) + distance
+        };
+        self.depth(point).abs() <= distance && within(|place| place.x) && within(|place| place.z)
+    }
+
     /// How far below it a point is along the normal; negative above.
-    fn depth(&self, point: &Vector) -> f64 {
+    pub(crate) fn depth(&self, point: &Vector) -> f64 {
         (self.corners[0] - point).dot(&self.up)
     }
 }
@@ -198,13 +207,13 @@ impl Relief {
     }
 
     /// The triangles of the squares that touch a rectangle.
-    fn faces(&self, x: [f64; 2], z: [f64; 2]) -> impl Iterator<Item = Face> {
+    pub(crate) fn faces(&self, x: [f64; 2], z: [f64; 2]) -> impl Iterator<Item = Face> {
         let ([i0, i1], [k0, k1]) = (self.columns(x[0], x[1]), self.columns(z[0], z[1]));
         (k0..k1).flat_map(move |k| (i0..i1).flat_map(move |i| self.square(i, k)))
     }
 
     /// The triangle above or below a place.
-    fn face(&self, x: f64, z: f64) -> Option<Face> {
+    pub(crate) fn face(&self, x: f64, z: f64) -> Option<Face> {
         self.faces([x; 2], [z; 2]).find(|face| face.holds(x, z))
     }
 
@@ -220,15 +229,14 @@ impl Relief {
         self.face(point.x, point.z).map(|face| face.depth(point))
     }
 
-    /// True if the surface around a place of it is nowhere higher along a direction.
-    fn is_outward(&self, place: &Vector, normal: &Vector) -> bool {
-        let most = TILT * self.soil.columns.cell();
+    /// True if the surface around a place of it is nowhere higher along a direction, up to a length.
+    pub(crate) fn is_outward(&self, place: &Vector, normal: &Vector, most: f64) -> bool {
         let mut around = self.faces([place.x; 2], [place.z; 2]).filter(|face| face.holds(place.x, place.z));
         around.all(|face| face.corners.iter().all(|corner| (corner - place).dot(normal) <= most))
     }
 
     /// The triangles within a distance of the body, and some more.
-    fn near<'a>(&self, rules: &'a Rules, motion: &Motion, more: f64) -> Cow<'a, [Face]> {
+    pub(crate) fn near<'a>(&self, rules: &'a Rules, motion: &Motion, more: f64) -> Cow<'a, [Face]> {
         match rules.close.as_ref().filter(|close| close.budget >= close.moved(rules, motion) + more) {
             Some(close) if self.is_of(rules) => Cow::Borrowed(&close.faces),
             _ => Cow::Owned(self.around_body(rules, motion, more)),
@@ -268,77 +276,6 @@ impl Relief {
         near
     }
 
-    /// All places within a margin where a body faces the surface.
-    pub(crate) fn facings(&self, rules: &Rules, motion: &Motion, margin: f64) -> Vec<Facing> {
-        let mut found: Vec<Facing> = Vec::new();
-        let small = 1e-9 * rules.size;
-        let mut push = |facing: Facing| {
-            let known = |other: &Facing| {
-                (other.arm - facing.arm).norm() <= 1e-6 * rules.size
-                    && other.normal.dot(&facing.normal) > 1.0 - TILT
-            };
-            if facing.gap <= margin && !found.iter().any(known) {
-                found.push(facing);
-            }
-        };
-        let faces = self.near(rules, motion, margin.max(0.0) + SKIN * rules.resolution());
-        for part in &rules.parts {
-            let (core, radius, width) = (rules.core(motion, part), part.radius(), rules.width(part));
-            let facing = |point: &Vector, normal: Vector, gap: f64| {
-                let arm = point - normal * radius - motion.position;
-                Facing { number: GROUND, gap, normal, arm, radius }
-            };
-            let reach = width + margin.max(0.0);
-            for point in &core {
-                let below = self.face(point.x, point.z).filter(|face| face.depth(point) >= -small);
-                if let Some(face) = below {
-                    push(facing(point, face.up, -face.depth(point) - width));
-                    continue;
-                }
-                for face in self.faces([point.x - reach, point.x + reach], [point.z - reach, point.z + reach])
-                {
-                    let above = -face.depth(point);
-                    if above > reach || above <= 0.0 {
-                        continue;
-                    }
-                    let foot = point - face.up * above;
-                    let way = match face.holds(foot.x, foot.z) {
-                        true => face.up * above,
-                        false => Meeting::of(&[*point], &face.corners).way,
-                    };
-                    let distance = way.norm();
-                    if distance - width > margin || distance <= small || way.dot(&face.up) <= 0.0 {
-                        continue;
-                    }
-                    let normal = way / distance;
-                    if self.is_outward(&(point - way), &normal) {
-                        push(facing(point, normal, distance - width));
-                    }
-                }
-            }
-            if core.len() == 1 {
-                continue;
-            }
-            for face in faces.iter().filter(|face| face.lowest(&core) <= reach) {
-                let Meeting { way, place } = Meeting::of(&core, &face.corners);
-                let distance = way.norm();
-                if distance - width > margin || way.dot(&face.up) < 0.0 {
-                    continue;
-                }
-                if distance > small {
-                    let normal = way / distance;
-                    if self.is_outward(&(place - way), &normal) {
-                        push(facing(&place, normal, distance - width));
-                    }
-                } else {
-                    let sunk = sunk(&core, face, rules.size);
-                    push(facing(&place, face.up, -sunk - width));
-                }
-            }
-        }
-        found
-    }
-
     /// What the body meets first in a step, as [`Rules::first_touch`] says it of solids.
     pub(crate) fn first_touch(&self, (rules, step): (&Rules, &Step), (depth, sunk): (f64, bool)) -> Touch {
         let (reach, position) = (rules.body.reach(), &step.first.position);
@@ -362,43 +299,39 @@ impl Relief {
             return Touch::At(step.start);
         }
         let bend = step.curvature(reach);
-        let cores: Vec<Vec<Vector>> = rules.parts.iter().map(|part| rules.core(&step.first, part)).collect();
-        for face in self.near(rules, &step.first, swept * share + skin).iter() {
-            for (part, core) in rules.parts.iter().zip(&cores) {
-                if face.lowest(core) > rules.width(part) + swept * share {
-                    continue;
-                }
+        let faces = self.near(rules, &step.first, swept * share + skin);
+        for part in &rules.parts {
+            let (core, width) = (rules.core(&step.first, part), rules.width(part));
+            let reach = width + swept * share;
+            let near: Vec<&Face> = faces.iter().filter(|face| face.lowest(&core) <= reach).collect();
+            let mut pass = |own: &[Vector], other: &[Vector]| {
                 let until = match first {
                     Touch::Nothing => step.end,
                     Touch::At(time) | Touch::Until(time) => time,
                 };
                 let place =
-                    |_: f64| Front { points: face.corners.to_vec(), velocities: vec![Vector::zeros(); 3] };
-                let found =
-                    rules.pass_by(step, part, (rules.width(part), &place), (bend, until), (depth, sunk));
+                    |_: f64| Front { points: other.to_vec(), velocities: vec![Vector::zeros(); other.len()] };
+                let found = pass_by(step, own, (width, &place), (bend, until), (depth, sunk));
                 if found != Touch::Nothing {
                     first = found;
+                }
+            };
+            for face in &near {
+                for (own, point) in part.core().iter().zip(&core) {
+                    if face.is_near(point, reach) {
+                        pass(&[*own], &face.corners);
+                    }
+                }
+            }
+            if core.len() > 1 {
+                let mut apart = Apart::new(&core, reach);
+                for Ridge { ends, .. } in ridges(&near, self.fold()) {
+                    if apart.meeting(&ends).is_some() {
+                        pass(part.core(), &ends);
+                    }
                 }
             }
         }
         first
     }
-}
-
-/// How far a core must move along the normal of a triangle until they part.
-fn sunk(core: &[Vector], face: &Face, size: f64) -> f64 {
-    let [mut inside, mut outside] = [0.0, core.iter().map(|point| face.depth(point)).fold(0.0, f64::max)];
-    for _ in 0..40 {
-        if outside - inside <= 1e-9 * size {
-            break;
-        }
-        let middle = (inside + outside) / 2.0;
-        let moved: Vec<Vector> = core.iter().map(|point| point + face.up * middle).collect();
-        if Meeting::of(&moved, &face.corners).way.norm() > 1e-9 * size {
-            outside = middle
-        } else {
-            inside = middle
-        }
-    }
-    outside
 }

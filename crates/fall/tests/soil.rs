@@ -102,6 +102,24 @@ fn what_lies_on_soil_is_covered_and_falls_when_it_is_dug_away() -> Result<(), Er
     Ok(())
 }
 
+/// Leaves come to rest on ground that is round, whose columns are much nearer to each other than the places on which a leaf lies: they do not rock from one column
+/// to the next for ever.
+#[test]
+fn leaves_come_to_rest_on_rounded_ground() -> Result<(), Error> {
+    for (number, bend) in [0.05, 0.4, -0.3, 1.5, 0.05, 0.2].into_iter().enumerate() {
+        let slope = 0.1 * number as f64 - 0.2;
+        let soil = Field(move |x, z, _| 0.05 - bend * (x * x + 0.5 * z * z) + slope * z);
+        // In tests without optimization, fewer contacts than a drawn leaf has.
+        let mut motion = Motion::at(Vector::new(0.01 * number as f64, 0.1, 0.02));
+        motion.spin = Vector::new(2.0 - number as f64, number as f64, 1.0);
+        let body = Body::plate(1e-3, [0.06, 0.035])?;
+        let mut fall = Fall::new(body, motion, 0.0, None, Settings::default())?;
+        let lies = fall.among(3.0, &Still, &soil)?;
+        assert_eq!((lies.velocity, lies.spin), (Vector::zeros(), Vector::zeros()), "{number}");
+    }
+    Ok(())
+}
+
 /// Where a body is let go in soil, it stays at its level; what is let go on it lies there at once.
 #[test]
 fn what_begins_in_soil_stays_at_its_level() -> Result<(), Error> {

@@ -39,7 +39,8 @@ impl Simplex {
     /// The point that is nearest to the origin, and the part that it lies in.
     fn nearest(&self) -> (Vector, Simplex) {
         let mut best = (Vector::repeat(f64::INFINITY), *self);
-        for chosen in 1_u8..1 << self.count {
+        // The last corner is part of it, or it would have been the nearest one before.
+        for chosen in 1_u8 << (self.count - 1)..1 << self.count {
             let mut part = Simplex { count: 0, ..*self };
             (0..self.count).filter(|i| chosen >> i & 1 == 1).for_each(|i| part.push(self.corners[i]));
             let place = |k: usize| part.corners[k].place;
@@ -65,7 +66,7 @@ impl Simplex {
 /// By the method of Gilbert, Johnson and Keerthi (*A fast procedure for computing the distance between complex objects in three-dimensional space*,
 /// 1988). There are one to three corners of the first hull.
 pub(crate) fn nearest(corners: &[Vector], core: &[Vector]) -> Nearest {
-    let (way, simplex) = approach(corners, core);
+    let (way, simplex, _) = approach(corners, core, f64::INFINITY);
     let mut weights = [0.0; 3];
     for k in 0..simplex.count {
         weights[simplex.corners[k].index] += simplex.weights[k];
@@ -86,10 +87,26 @@ pub struct Meeting {
 impl Meeting {
     /// Of the hulls of points in common axes; the origin is a hull without points.
     pub fn of(first: &[Vector], second: &[Vector]) -> Meeting {
-        if first.is_empty() {
-            return Meeting::of(&[Vector::zeros()], second);
+        let first = if first.is_empty() { &[Vector::zeros()] } else { first };
+        let (way, simplex, _) = approach(first, second, f64::INFINITY);
+        Meeting::at(first, way, simplex)
+    }
+
+    /// The same of hulls that are not further apart than a distance (m), which takes less work for others.
+    ///
+    /// # Errors
+    ///
+    /// Hulls that are further apart: a direction, from the second one to the first, along which they are.
+    pub fn within(first: &[Vector], second: &[Vector], distance: f64) -> Result<Meeting, Vector> {
+        let first = if first.is_empty() { &[Vector::zeros()] } else { first };
+        let (way, simplex, is_near) = approach(first, second, distance);
+        if is_near && way.norm_squared() <= distance * distance {
+            return Ok(Meeting::at(first, way, simplex));
         }
-        let (way, simplex) = approach(first, second);
+        Err(way)
+    }
+
+    fn at(first: &[Vector], way: Vector, simplex: Simplex) -> Meeting {
         let (mut place, mut sum) = (Vector::zeros(), 0.0);
         for k in 0..simplex.count {
             place += first[simplex.corners[k].index] * simplex.weights[k];
@@ -122,30 +139,46 @@ impl Simplex {
     }
 }
 
-/// The shortest way from the second hull to the first one, and the differences of corners that it lies among. The first one has a corner.
-fn approach(first: &[Vector], second: &[Vector]) -> (Vector, Simplex) {
+/// The corner that is first along a direction, by the lower value; of equal ones, the first.
+fn foremost(points: &[Vector], direction: &Vector) -> usize {
+    let mut best = (0, f64::INFINITY);
+    for (index, point) in points.iter().enumerate() {
+        let along = point.dot(direction);
+        if along < best.1 {
+            best = (index, along);
+        }
+    }
+    best.0
+}
+
+/// The shortest way from the second hull to the first one, and the differences of corners that it lies among; false, and any way, if it is surely longer than a
+/// limit. The first hull has a corner.
+fn approach(first: &[Vector], second: &[Vector], limit: f64) -> (Vector, Simplex, bool) {
     let difference = |direction: Vector| {
-        let along = |point: &Vector| point.dot(&direction);
-        let lowest = (0..first.len()).min_by(|a, b| along(&first[*a]).total_cmp(&along(&first[*b])));
-        let highest = second.iter().max_by(|a, b| along(a).total_cmp(&along(b)));
-        let index = lowest.unwrap_or(0);
-        Corner { place: first[index] - highest.copied().unwrap_or_else(Vector::zeros), index }
+        let index = foremost(first, &direction);
+        let other = second.get(foremost(second, &-direction));
+        Corner { place: first[index] - other.copied().unwrap_or_else(Vector::zeros), index }
     };
     let begin = difference(Vector::zeros());
     let mut simplex = Simplex { corners: [begin; 4], weights: [1.0; 4], count: 1 };
     let mut way = begin.place;
     for _ in 0..STEPS {
         let next = difference(way);
-        let gain = way.norm_squared() - next.place.dot(&way);
+        let (square, along) = (way.norm_squared(), next.place.dot(&way));
+        // All differences are as far along the way as this one.
+        if along > 0.0 && along * along > limit * limit * square {
+            return (way, simplex, false);
+        }
+        let gain = square - along;
         let known = simplex.corners[..simplex.count].iter().any(|corner| corner.place == next.place);
-        if gain <= 1e-14 * way.norm_squared() || known {
+        if gain <= 1e-14 * square || known {
             break;
         }
         let mut larger = simplex;
         larger.push(next);
         let (found, part) = larger.nearest();
         // Rounding: there is no progress any more.
-        if found.norm_squared() >= way.norm_squared() {
+        if found.norm_squared() >= square {
             break;
         }
         (way, simplex) = (found, part);
@@ -153,7 +186,7 @@ fn approach(first: &[Vector], second: &[Vector]) -> (Vector, Simplex) {
             break;
         }
     }
-    (way, simplex)
+    (way, simplex, true)
 }
 
 /// Weights of the foot of the perpendicular from the origin, if it lies between the ends.
@@ -250,6 +283,17 @@ mod tests {
             let (first, second) = (made(1.0), made(1.5));
             let Meeting { way, place } = Meeting::of(&first, &second);
             let distance = way.norm();
+            let limit = (number() + 1.0).abs();
+            let within = Meeting::within(&first, &second, limit);
+            match within {
+                Ok(found) => assert!(distance <= limit && found == Meeting { way, place }),
+                Err(axis) => {
+                    let least = first.iter().map(|point| point.dot(&axis)).fold(f64::INFINITY, f64::min);
+                    let most = second.iter().map(|point| point.dot(&axis)).fold(f64::NEG_INFINITY, f64::max);
+                    let apart = (least - most) / axis.norm();
+                    assert!(distance > limit && apart > limit * (1.0 - 1e-9), "{apart} {limit}");
+                }
+            }
             met += usize::from(distance == 0.0);
             if distance > 0.0 {
                 let level = |point: &Vector| (point - place).dot(&way) / distance;
