@@ -149,6 +149,17 @@ impl Coats {
         })
     }
 
+    /// The corners of all patches.
+    pub fn all(&self) -> impl Iterator<Item = [Vector; 3]> + '_ {
+        let triangles = self.triangles.iter().zip(self.divisions.iter());
+        triangles.flat_map(|(corners, (count, _))| {
+            let corners = corners.map(|n| self.points[n as usize]);
+            let rows =
+                (0..*count).flat_map(move |row| (0..2 * (count - row) - 1).map(move |place| (row, place)));
+            rows.map(move |(row, place)| part(*count, row, place).map(|weights| mean(weights, corners)))
+        })
+    }
+
     /// The acceleration of the middle of a patch, from the tick before to this one, in which the body goes on from where it was.
     fn acceleration(&self, body: &Body, (corners, weights): ([u32; 3], [[f64; 3]; 3]), tick: f64) -> f64 {
         let change = corners.map(|n| {
