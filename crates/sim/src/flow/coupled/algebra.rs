@@ -406,8 +406,9 @@ impl Solver<'_> {
                 }
             }
             std::mem::swap(&mut left, &mut trial);
-            // At a double root corrections only halve.
-            if part == 1.0 && whole < 1e-6 && whole > 0.4 * last {
+            // At a double root corrections only halve, and so do those that are rounding, where an unknown passes zero.
+            let halves = part == 1.0 && whole < 1e-6 && whole > 0.4 * last;
+            if halves && self.condition(block, y) < FADING {
                 return Err(AlgebraicError::Singular(places[0]));
             }
             last = whole;
