@@ -171,7 +171,9 @@ fn refuse(format: interchange::Format, given: &[(&str, bool)], why: &str) -> Res
 /// Runs the model twice: to measure it, because all accuracy is relative to its extent, and to follow it.
 fn write(order: &Order<'_>, run: ModelRun, stale: &dyn Fn() -> bool) -> Result<(), Failure> {
     let begun = Instant::now();
-    if !run.session.model.scenery.plants.is_empty() {
+    let is_still = run.times.len() < 2 && order.topology != Topology::Varying;
+    let holds_plants = is_still && order.format == interchange::Format::Glb;
+    if !holds_plants && !run.session.model.scenery.plants.is_empty() {
         return Err(failure(&run, &Error::Plants));
     }
     let mut clock = run.clock;
@@ -363,8 +365,8 @@ fn failure(run: &ModelRun, error: &interchange::Error) -> Failure {
         Error::Run(error) => return run.fault(error),
         Error::Draw(error) => return drawn(error.diagnostic()),
         Error::Plants => &[
-            "write the other model by itself, and place copies of it in the program that takes the file",
-            "a single time of the whole scene: `dlsys render MODEL --at T --format obj`",
+            "a single time of the whole scene: `dlsys render MODEL --at T -o scene.glb`, in which plants that look the same share a mesh",
+            "for what moves, write the other model by itself, and place copies of it in the program that takes the file",
         ],
         Error::TooMany { .. } => &[
             "each is a node of its own, and programs for scenes hardly open more; end earlier with `--to T`",

@@ -354,3 +354,72 @@ fn a_full_disk_is_a_failure() {
         assert!(output.status.code() == Some(1) && said.contains("cannot write"), "{arguments:?}: {said}");
     }
 }
+
+#[test]
+fn the_page_on_the_command_line_has_all_commands_and_formats() {
+    let page = std::fs::read_to_string(repository("docs/src/language/command-line.md")).expect("a page");
+    let help = good(&["help"]);
+    // A name begins behind two spaces; its description goes on further to the right.
+    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let commands = commands.take_while(|line| !line.is_empty()).filter_map(|line| {
+        let word = line.strip_prefix("  ")?;
+        word.starts_with(char::is_alphabetic).then(|| word.split_whitespace().next())?
+    });
+    let commands: Vec<&str> = commands.collect();
+    assert!(commands.contains(&"repl") && commands.len() > 10, "{commands:?}");
+    for command in commands {
+        assert!(
+            page.contains(&format!("\ndlsys {command} ")) || page.contains(&format!("\ndlsys {command}\n")),
+            "{command}"
+        );
+    }
+    let help = good(&["help", "render"]);
+    let formats = help.lines().skip_while(|line| !line.contains("--format <")).skip(1);
+    let formats = formats
+        .take_while(|line| !line.trim_start().starts_with("--"))
+        .filter_map(|line| line.trim_start().strip_prefix("- ")?.split_once(':').map(|(format, _)| format));
+    let formats: Vec<&str> = formats.collect();
+    assert!(formats.len() >= 10, "{formats:?}");
+    for format in formats {
+        assert!(
+            page.contains(&format!("`{format}`")) || page.contains(&format!("`--format {format}`")),
+            "{format}"
+        );
+    }
+}
+
+#[test]
+fn signs_that_end_something_in_c_get_a_warning_in_strings() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("c.dls");
+    let said = |model: &str| {
+        std::fs::write(&file, model).expect("written");
+        let output = dlsys(&["check", file.to_str().expect("UTF-8")]);
+        text(&output.stderr)
+    };
+    let rest = "A(x) -> F(x)\n";
+    for (string, wanted) in [
+        ("F  // the trunk", "`//` begins no comment"),
+        ("F  \\\n  F", "does not join lines"),
+        ("F [+F];", "`;` does not end a line"),
+    ] {
+        let found = said(&format!("initial string: A(1) {string}\n{rest}"));
+        assert!(found.contains(wanted), "{string}: {found}");
+    }
+    for string in ["F // F", "F \\(30) F", "F ;", "F ; F // [ F ]"] {
+        let found = said(&format!("initial string: A(1) {string}\n{rest}"));
+        assert!(!found.contains("begins no comment") && !found.contains("does not"), "{string}: {found}");
+    }
+    for (model, wanted) in [
+        ("initial string: A(0)\nA(n): n % 2 = 0 -> F(n)\n", "a remainder is written `n - 2*floor(n/2)`"),
+        (
+            "initial string: A(0)\nA(x):\n  if x < 1 solve dx/dt = 1\n  elif x < 2 solve dx/dt = 2\n",
+            "every clause begins with `if …`",
+        ),
+        ("include \"c.dls\"\ninitial string: F(1)\n", "this file includes itself"),
+        ("surface @Q from \"organs\\leaf.s\"\ninitial string: @Q(1)\n", "separated by `/`, not by `\\`"),
+    ] {
+        let found = said(model);
+        assert!(found.contains(wanted), "{model}: {found}");
+    }
+}

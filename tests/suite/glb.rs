@@ -336,3 +336,40 @@ fn the_program_writes_files_whole_or_not_at_all() {
     assert_eq!(fs::read_to_string(at("thesis.glb")).expect("there"), "years of work");
     assert!(!repository("a.glb").exists());
 }
+
+/// Plants of other models, one of which holds another, at a single time: where they are, how they are turned, and one mesh for those that look the same.
+#[test]
+fn a_scene_of_plants_at_one_time_is_nodes_that_share_meshes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let write = |name: &str, text: &str| fs::write(at(name), text).expect("written");
+    write("twig.dls", "initial string: F(1)\nF(x): solve dx/dt = 1\ninterpret F(x): !(0.2) F(x)\n");
+    write("bush.dls", "plant @Twig from \"twig.dls\"\ninitial string: F(3) -(90) @Twig(0)\n");
+    write(
+        "scene.dls",
+        "plant @Twig from \"twig.dls\"\nplant @Bush from \"bush.dls\"\nframes 0 .. 2 step 1\n\
+         initial string: [ f(5) @Twig(0) ] [ -(90) f(4) @Twig(0) ] [ +(90) f(7) -(90) @Bush(0) ]\n",
+    );
+    let said = good(&["render", &at("scene.dls"), "--at", "2", "-o", &at("scene.glb")]);
+    assert!(said.contains("4 nodes, 3 different lives"), "{said}");
+    let glb = Glb::read(&fs::read(at("scene.glb")).expect("a file"));
+    assert!(glb.json["animations"].is_null());
+    assert_eq!(glb.json["meshes"].as_array().map(Vec::len), Some(3), "{}", glb.json["meshes"]);
+    let nodes = glb.nodes().iter().filter(|node| node["extras"]["kind"] == "@Twig");
+    let meshes: Vec<String> = nodes.map(|node| node["mesh"].to_string()).collect();
+    assert!(meshes.len() == 3 && meshes[0] == meshes[1], "{meshes:?}");
+    // The twigs have a length of 3 and a radius of 0.1, and the bush has one at its top.
+    let ends = [([0.0, 5.0], [0.0, 8.0]), ([4.0, 0.0], [7.0, 0.0]), ([-7.0, 3.0], [-4.0, 3.0])];
+    let shown: Vec<Shown> = glb.shown(0.0).into_values().collect();
+    for ([x, y], [to_x, to_y]) in ends {
+        for part in [0.1, 0.5, 0.9] {
+            let axis = Point::new(x + (to_x - x) * part, y + (to_y - y) * part, 0.0);
+            let away = shown.iter().map(|shown| shown.distance(axis)).fold(f64::INFINITY, f64::min);
+            assert!((away - 0.1).abs() < 0.01, "{axis}: {away}");
+        }
+    }
+    for arguments in [&["--at", "2", "-o", "a.usda"][..], &["-o", "a.glb"]] {
+        let (_, message) = bad(&[&["render", &at("scene.dls")], arguments].concat());
+        assert!(message.contains("GLB files of a single time") && message.contains("--at T -o"), "{message}");
+    }
+}

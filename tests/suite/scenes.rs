@@ -2,7 +2,7 @@
 //! before; names of older models that are words now stay names.
 
 use dlsys::model::{Primitive, Spectrum, Tissue, Units};
-use dlsys::scene::{Scene, Surroundings};
+use dlsys::scene::{Point, Scene, Surroundings};
 use dlsys::session::{Nursery, Session};
 use dlsys::sim::Settings;
 use dlsys::tree::ModuleString;
@@ -178,6 +178,32 @@ fn plants_stand_in_plants_and_never_in_themselves() {
         message.contains("the plant `@Late` cannot grow to the age 3") && message.contains("limit.dls:2:"),
         "{message}"
     );
+}
+
+#[test]
+fn plants_are_as_large_as_their_third_parameter_says() {
+    let main = "plant @Stem from \"stem.dls\"\nplant @Ripe from \"ripe.dls\"\nparam k = 1 in 0 .. 9\n\
+        initial string: @Stem(0) f(2) @Stem(0, 0, 0.5) @Stem(0, 0, 0) @Stem(0, 0, -1) @Ripe(0, 0, k)\n";
+    let ripe = "units length 1, time 1\nground 0\ninitial string: f(0.5) @D @P(0.05, 0.06)\n";
+    let here = folder(&[("main.dls", main), ("stem.dls", STEM), ("ripe.dls", ripe)]);
+    let session = open(here.path(), "main.dls");
+    let scene = drawn(&session, 3.5, 1);
+    assert_eq!(scene.plants.len(), 3, "those of no size are not there");
+    assert!(std::sync::Arc::ptr_eq(&scene.plants[0].scene, &scene.plants[1].scene), "one drawing");
+    let flat = scene.flattened();
+    let (whole, half) = flat.segments.split_at(flat.segments.len() / 2);
+    assert!(whole.len() > 2 && whole.len() == half.len());
+    for (whole, half) in whole.iter().zip(half) {
+        let wanted = Point::new(0.0, 2.0, 0.0) + whole.end.coords / 2.0;
+        assert!((half.end - wanted).norm() < 1e-12, "{:?} {wanted:?}", half.end);
+    }
+    let twice = dlsys::compile::Setting { name: "k".to_owned(), value: 2.0 };
+    let session = Session::open(&here.path().join("main.dls"), &[twice]).expect("a model");
+    let nursery = Nursery::new(&session.model, Settings::default());
+    let error =
+        nursery.draw(&string(&session, 3.5, 1), &mut nursery.blank()).expect_err("it lets something go");
+    let message = error.diagnostic().render(&session.source, false);
+    assert!(message.contains("has the size of its model") && message.contains("main.dls:2:"), "{message}");
 }
 
 #[test]

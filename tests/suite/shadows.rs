@@ -106,6 +106,37 @@ fn without_a_sun_the_floor_is_soft_and_dark_where_something_stands() {
     assert!(near > 120.0, "no hard shadow: {near}");
 }
 
+/// Small pictures have fewer and coarser maps of the sky's light: the light is that of a large picture, but for edges.
+#[test]
+fn a_small_picture_has_the_light_of_a_large_one() {
+    let mut scene = scene("!(0.3)F(1.5)[^(70)@L(2)][&(70)@L(2)]/(90)[^(60)@K(1)]F(1.5)@O(1)");
+    scene.surroundings.floor = Some(0.0);
+    scene.surroundings.sky = Some([Color::hex(0x8f_b8e6), Color::hex(0xee_f3f7)]);
+    let fit = fit(&scene, "30,30");
+    let drawn = |side: u32| {
+        let page = Page::new(fit.picture, Size::Exact(side, side), None).expect("small");
+        pixels_by(&scene, &fit, &page, Smoothness::Fine, 1)
+    };
+    let large = drawn(960);
+    for side in [120, 320] {
+        let (small, zoom) = (drawn(side), (960 / side) as usize);
+        let mean = |x: usize, y: usize, k: usize| {
+            let block = (0..zoom * zoom).map(|i| (y * zoom + i / zoom) * 960 + x * zoom + i % zoom);
+            block.map(|at| f64::from(large[at][k])).sum::<f64>() / (zoom * zoom) as f64
+        };
+        let pixels = side as usize * side as usize;
+        let differences = (0..3 * pixels).map(|i| {
+            let (k, at) = (i % 3, i / 3);
+            (f64::from(small[at][k]) - mean(at % side as usize, at / side as usize, k)).abs()
+        });
+        let mut differences: Vec<f64> = differences.collect();
+        differences.sort_by(f64::total_cmp);
+        let whole = differences.iter().sum::<f64>() / differences.len() as f64;
+        let most = differences[differences.len() * 99 / 100];
+        assert!(whole < 1.5 && most < 12.0, "{side}: {whole} on average, {most} at most but for a hundredth");
+    }
+}
+
 #[test]
 fn light_stays_within_bounds_and_passes_through_leaves() {
     // A leaf that the sun lights from above, seen from both sides.

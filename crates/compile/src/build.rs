@@ -50,6 +50,7 @@ pub fn build(
     }
     parts.check_strings(&mut builder, unread);
     porting::comments(document, &mut builder.scope.diagnostics);
+    porting::strays(document, &mut builder.scope.diagnostics);
     let RuleBuilder { occurs, drawn, clocks, inputs, materials, .. } = builder;
     if !parts.singles.seen(INITIAL_STRING) && !unread {
         scope.diagnostics.push(

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use crate::clauses::names_of;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{Class, DRAWN_WORDS, KindId, Model, base_of};
-use dlsys_syntax::ast::{self, Action, Document, Item, modules_of};
+use dlsys_syntax::ast::{self, Action, Document, Item, Stray, modules_of};
 use dlsys_syntax::foreign_syntax;
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::nearest;
@@ -18,6 +18,30 @@ pub fn comments(document: &Document, diagnostics: &mut Vec<Diagnostic>) {
                 .at(*span, "`#` begins a comment; in cpfg it sets the width of lines")
                 .help(format!("a width is written `!({inside})`; a comment that begins with a parenthesis has a space before it: `# (…)`")),
         );
+    }
+}
+
+/// Warns of signs in strings that end something in C.
+pub fn strays(document: &Document, diagnostics: &mut Vec<Diagnostic>) {
+    for (span, stray) in &document.strays {
+        let (what, at, help) = match stray {
+            Stray::Comment => (
+                "`//` begins no comment",
+                "these are two rolls, and the words behind them are modules",
+                "a comment begins with `#` and ends with its line",
+            ),
+            Stray::Continuation => (
+                "`\\` at the end of a line does not join lines",
+                "this is a roll by `angle`",
+                "a string goes on in the next line by itself: leave the sign out, or begin the next line with it",
+            ),
+            Stray::End => (
+                "`;` does not end a line",
+                "this takes the next colour for what follows",
+                "a declaration ends with its line: leave the sign out; as a module it has a space before it",
+            ),
+        };
+        diagnostics.push(Diagnostic::warning(what).at(*span, at).help(help));
     }
 }
 

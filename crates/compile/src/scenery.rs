@@ -15,7 +15,7 @@ use dlsys_expr::{NodeId, Program};
 use dlsys_model::{Appearance, COMMAND_SURFACES, Camera, Plant, Scenery};
 use dlsys_syntax::Files;
 use dlsys_syntax::ast::{Document, Expression, Item, Name, Text};
-use dlsys_syntax::is_inside;
+use dlsys_syntax::fault_of_path;
 
 /// Maximum depth of plants in plants.
 const MAX_DEPTH: usize = 8;
@@ -258,8 +258,8 @@ impl Builder<'_> {
         let fault = |what: String| {
             Diagnostic::error(format!("{UNREADABLE} `{}` cannot be read", name.text)).at(file.span, what)
         };
-        if !is_inside(&file.text) {
-            return Err(Box::new(fault("the path leaves the model's folder".to_owned()).help(
+        if let Some(why) = fault_of_path(&file.text) {
+            return Err(Box::new(fault(why.to_owned()).help(
                 "models of plants stand in the folder of this model or below it, and their paths begin there",
             )));
         }

@@ -12,7 +12,7 @@ use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::Program;
 use dlsys_model::{Appearance, Bed, HeightGrid, Pour, Relief, Soil, SoilBase, Texture};
 use dlsys_syntax::ast::{Attribute, Expression, Expressions, Name, Text};
-use dlsys_syntax::is_inside;
+use dlsys_syntax::fault_of_path;
 
 /// The largest file of heights, in bytes.
 const MAX_FILE: u64 = 256 << 20;
@@ -361,12 +361,12 @@ impl Builder<'_> {
 
     /// The heights of a file: a line for each row, from the least z on, and in it numbers from the least x on.
     fn height_grid(&mut self, file: &Text) -> Option<HeightGrid> {
-        let read = match is_inside(&file.text) {
-            true => {
+        let read = match fault_of_path(&file.text) {
+            None => {
                 let path: PathBuf = Path::new(&file.text).components().collect();
                 self.files.read(&path, MAX_FILE)
             }
-            false => Err("the path leaves the model's folder".to_owned()),
+            Some(why) => Err(why.to_owned()),
         };
         let grid = read.and_then(|bytes| {
             let text = String::from_utf8(bytes).map_err(|_| "it is no text".to_owned())?;

@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use dlsys_expr::MAX_POINTS;
-use dlsys_syntax::{Files, is_inside};
+use dlsys_syntax::{Files, fault_of_path};
 
 /// Maximum size of a file, in bytes.
 const SIZE_LIMIT: u64 = 64 << 20;
@@ -43,10 +43,10 @@ pub fn read(path: &str, column: Option<&str>, files: &dyn Files) -> Result<Vec<T
 
 /// The text of a file of numbers in the folder of the model.
 pub fn text_of(path: &str, files: &dyn Files) -> Result<String, TableError> {
-    if !is_inside(path) {
+    if let Some(why) = fault_of_path(path) {
         return Err(TableError::new(
             None,
-            "the path leaves the model's folder",
+            why,
             "files of numbers stand in the folder of the model or below it, as in `\"data/temperature.csv\"`",
         ));
     }

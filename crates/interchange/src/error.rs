@@ -12,8 +12,8 @@ pub enum Error {
     /// A scene cannot be drawn.
     #[error(transparent)]
     Draw(#[from] DrawError),
-    /// Plants of other models are scenes of their own.
-    #[error("the scene is made of plants of other models, and one file holds one model")]
+    /// Plants of other models are followed at a single time only, and written as GLB.
+    #[error("the scene has plants of other models, which stand in GLB files of a single time only")]
     Plants,
     /// More modules draw than a file should have nodes.
     #[error("more than {limit} modules draw something by t = {time}")]

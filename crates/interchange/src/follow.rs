@@ -13,6 +13,7 @@ use dlsys_tree::ModuleString;
 
 use crate::part::{Frame, distance, reach};
 use crate::sample::{Sample, Sampler};
+use crate::stand::Planted;
 use crate::thin::weight;
 use crate::track::{Ending, Tracks};
 use crate::{Error, Limits};
@@ -61,6 +62,10 @@ pub(crate) struct Follower<'m, 'a> {
     pub(crate) births: HashMap<u64, f64>,
     /// The model lets something go.
     pub(crate) falls: bool,
+    /// There is one frame.
+    pub(crate) is_still: bool,
+    /// The plants of other models in that.
+    pub(crate) planted: Vec<Planted>,
 }
 
 /// A drawn sample, and whether the interval up to it is known to be straight enough.
@@ -84,6 +89,7 @@ impl Follower<'_, '_> {
         let Some((&first, rest)) = frames.split_first() else { return Ok(()) };
         let mut start = self.take(vec![first])?.pop().unwrap_or_default();
         self.check(&start)?;
+        self.planted = std::mem::take(&mut start.planted);
         let tolerance = self.closeness.thin;
         self.tracks.add(&start, None, &self.births, tolerance);
         let mut rest = rest;
@@ -307,16 +313,18 @@ impl Follower<'_, '_> {
             simulation.at(time, &mut string)?;
             strings.push(string);
         }
-        let (nursery, sampler, blank) = (self.nursery, &self.sampler, &self.blank);
+        let (nursery, sampler, blank, is_still) = (self.nursery, &self.sampler, &self.blank, self.is_still);
         let draw = |strings: &[ModuleString]| -> Result<Vec<Sample>, Error> {
             let mut scene = blank.clone();
             let one = |string: &ModuleString| {
                 scene.clear();
                 nursery.draw(string, &mut scene)?;
-                if !scene.plants.is_empty() {
+                if !scene.plants.is_empty() && !is_still {
                     return Err(Error::Plants);
                 }
-                Ok(sampler.sample(string.time, &scene))
+                let mut sample = sampler.sample(string.time, &scene);
+                sample.planted = Planted::all(&scene);
+                Ok(sample)
             };
             strings.iter().map(one).collect()
         };

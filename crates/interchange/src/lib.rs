@@ -6,6 +6,7 @@
 //!
 //! - [`grow`] follows a run ([`Growth`]): each module that draws something has a frame, which moves, and a shape in that frame, which is mostly a
 //!   function of its age. Modules with the same shapes at the same ages share one life.
+//! - Plants of other models stand in files of a single time only: a mesh for each look, a node for each plant.
 //! - [`Growth::file`] writes the file: a mesh for each life, with morph targets, or samples of its points, at ages chosen for the accuracy; a node for each
 //!   module, with tracks for translation and rotation, and for the scale, which is 0 before birth and after death.
 //!
@@ -41,6 +42,7 @@ mod motion;
 mod part;
 mod sample;
 mod soil;
+mod stand;
 mod stem;
 mod thin;
 mod track;
@@ -61,6 +63,7 @@ use life::{Lives, Tolerance};
 use mesh::Cutter;
 use motion::Clock;
 use sample::Sampler;
+use stand::Stands;
 use track::Tracks;
 pub use usd::varying::{Summary, vary_usda};
 
@@ -176,6 +179,7 @@ pub struct Growth {
     tracks: Tracks,
     lives: Lives,
     gases: Vec<GasTrack>,
+    stands: Stands,
 }
 
 /// Seconds within which something that appears without a production may be early or late.
@@ -225,9 +229,19 @@ pub fn grow(
         tracks: Tracks::default(),
         births: HashMap::new(),
         falls: dlsys_geometry::turtle::lets_go(model),
+        is_still: times.len() < 2,
+        planted: Vec::new(),
     };
     follower.follow(times, progress)?;
     let mut tracks = follower.tracks;
+    let stands = Stands::new(&follower.planted, options.metres, &mut tracks.catalogue);
+    let Limits { nodes, numbers, .. } = options.limits;
+    if tracks.phases.len() + stands.stands.len() > nodes {
+        return Err(Error::TooMany { time: last, limit: nodes });
+    }
+    if stands.size() > numbers {
+        return Err(Error::TooLarge { time: last, limit: numbers });
+    }
     let particles =
         soil::follow(&nursery, (sampler, 0.1 * tolerance), times, options, &mut tracks, progress)?;
     let mut gases = match options.gases && dlsys_geometry::turtle::lets_out(model) {
@@ -250,6 +264,7 @@ pub fn grow(
         tracks,
         lives,
         gases,
+        stands,
     })
 }
 
@@ -269,23 +284,24 @@ impl Growth {
         Clock::new(self.first, self.last, self.options.seconds)
     }
 
-    /// Number of nodes of modules.
+    /// Number of nodes of modules, plants of other models included.
     pub fn nodes(&self) -> usize {
-        self.tracks.phases.len()
+        self.tracks.phases.len() + self.stands.stands.len()
     }
 
-    /// Number of different lives.
+    /// Number of different lives, and of looks of plants of other models.
     pub fn lives(&self) -> usize {
-        self.lives.lives.len()
+        self.lives.lives.len() + self.stands.looks.len()
     }
 
     /// The file in a format.
     ///
     /// # Errors
-    /// If it is larger than a GLB file can be.
+    /// If it is larger than a GLB file can be; USD, if there are plants of other models.
     pub fn file(&self, format: Format) -> Result<Vec<u8>, Error> {
         match format {
             Format::Glb => glb::file(self),
+            Format::Usda if !self.stands.stands.is_empty() => Err(Error::Plants),
             Format::Usda => Ok(usd::file(self)),
         }
     }

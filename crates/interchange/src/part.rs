@@ -158,6 +158,14 @@ impl Frame {
         Frame { origin, turn: UnitQuaternion::new_normalize(turn.into_inner()) }
     }
 
+    /// A frame that turns the axes of space to these, which are at right angles to one another and right-handed.
+    pub(crate) fn of_axes(origin: Point, axes: [Vector; 3]) -> Frame {
+        let turn = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(
+            Matrix3::from_columns(&axes),
+        ));
+        Frame { origin, turn: UnitQuaternion::new_normalize(turn.into_inner()) }
+    }
+
     /// A displacement of the scene in this frame.
     pub(crate) fn local(&self, v: Vector) -> Vector {
         self.turn.inverse_transform_vector(&v)

@@ -6,6 +6,7 @@ use dlsys_geometry::scene::{MaterialId, Owner, OwnerId, Point, Scene, Segment, V
 use dlsys_tree::Lineage;
 
 use crate::part::{Frame, Number, Part, Source};
+use crate::stand::Planted;
 
 /// Everything that is drawn at one instant.
 #[derive(Debug)]
@@ -18,6 +19,8 @@ pub(crate) struct Sample<N = f32> {
     numbers: Vec<N>,
     /// Surfaces that the parts name.
     pub(crate) sources: Vec<(usize, Source)>,
+    /// Plants of other models.
+    pub(crate) planted: Vec<Planted>,
 }
 
 /// A module that draws something.
@@ -34,7 +37,8 @@ pub(crate) struct Module {
 impl<N> Default for Sample<N> {
     fn default() -> Sample<N> {
         let (modules, parts, materials) = (Vec::new(), Vec::new(), Vec::new());
-        Sample { time: 0.0, modules, parts, materials, numbers: Vec::new(), sources: Vec::new() }
+        let (numbers, sources, planted) = (Vec::new(), Vec::new(), Vec::new());
+        Sample { time: 0.0, modules, parts, materials, numbers, sources, planted }
     }
 }
 
@@ -84,8 +88,8 @@ pub(crate) struct Sampler {
 }
 
 impl Sampler {
-    /// The modules of a scene, in the order of its owners.
-    pub(crate) fn sample<N: Number>(&self, time: f64, scene: &Scene) -> Sample<N> {
+    /// The elements of a scene, by module.
+    fn elements(&self, scene: &Scene) -> Vec<(OwnerId, Element)> {
         let mut elements: Vec<(OwnerId, Element)> = Vec::new();
         let visible = |segment: &Segment| segment.widths.iter().any(|w| w.resolve(self.default_width) > 0.0);
         let segments = scene.segments.iter().enumerate().filter(|(_, segment)| visible(segment));
@@ -95,6 +99,24 @@ impl Sampler {
         elements.extend(scene.patches.iter().enumerate().map(|(i, e)| (e.owner, Element::Patch(i))));
         // Stable: elements of a module stay in order.
         elements.sort_by_key(|(owner, _)| *owner);
+        elements
+    }
+
+    /// All of a scene as one module, in the coordinates of the scene; no module if it has nothing.
+    pub(crate) fn whole<N: Number>(&self, scene: &Scene) -> Sample<N> {
+        let mut sample = Sample::default();
+        let elements = self.elements(scene);
+        let Some((first, _)) = elements.first() else { return sample };
+        let Owner { name, lineage } = scene.owner(*first);
+        let frame = Frame::new(Point::origin(), Vector::y(), -Vector::x());
+        sample.modules.push(Module { lineage: *lineage, kind: name.clone(), frame, part: 0, number: 0 });
+        elements.iter().for_each(|(_, element)| self.add(scene, *element, &frame, &mut sample));
+        sample
+    }
+
+    /// The modules of a scene, in the order of its owners.
+    pub(crate) fn sample<N: Number>(&self, time: f64, scene: &Scene) -> Sample<N> {
+        let elements = self.elements(scene);
         let mut sample = Sample { time, ..Sample::default() };
         for group in elements.chunk_by(|a, b| a.0 == b.0) {
             let frame = self.frame(scene, group);

@@ -7,7 +7,7 @@ use super::casters::Casters;
 use super::haze::{self, Haze};
 use super::lens::Lens;
 use super::light::{GLOSS, SHARPNESS, Spot, TRANSMITTED};
-use super::shadow::{Maps, OpenSky};
+use super::shadow::{Fineness, Maps, OpenSky};
 use super::{Camera, Fit, Page, floor, light};
 use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Surroundings, Vector};
 
@@ -92,6 +92,9 @@ impl<'a> Lighting<'a> {
         let mut open_sky = None;
         let maps = (declared.is_some() || floor.is_some()).then(|| {
             let extent = if fit.extent > 0.0 { fit.extent } else { 1.0 };
+            let larger = lens.map_or(f64::INFINITY, |lens| lens.size[0].max(lens.size[1]) as f64);
+            // Soil is a surface on which the edges of single maps would be seen.
+            let fineness = Fineness::of(if scene.terrain.is_some() { f64::INFINITY } else { larger });
             // Details beyond the maps' cells cast no shadows of their own.
             let seen = |p| fit.camera.ahead(p).map_or(0.0, |p| scale * fit.camera.magnification(p.z));
             let counts = |middle: Point, radius: f64| {
@@ -99,8 +102,8 @@ impl<'a> Lighting<'a> {
                     || lens.is_none_or(|lens| is_shadow_seen(lens, (middle, radius), sun, floor))
             };
             let casters = Casters::new(scene, fit, scale.min(1500.0 / extent), seen, ground, counts);
-            let maps = (casters.count() > 0).then(|| Maps::new(&casters, sun, scale, threads))?;
-            open_sky = floor.map(|height| OpenSky::new(&maps, casters.around(), height, threads));
+            let maps = (casters.count() > 0).then(|| Maps::new(&casters, sun, scale, fineness, threads))?;
+            open_sky = floor.map(|height| OpenSky::new(&maps, casters.around(), height, fineness, threads));
             Some(maps)
         });
         let ground = floor_color(&around);

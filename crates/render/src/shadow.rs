@@ -6,8 +6,9 @@
 //!
 //! **Errors.** The edge of a shadow is smooth over three cells of the map, and a shadow begins up to [`SLOPE`] cells behind what casts it (the
 //! price of no self-shadowing on slopes). The cell of the sun's map is a pixel of the picture, or a [`FINEST`]th of the scene where that is more; that
-//! of the sky's maps is a [`COARSE`]th of the scene, so crevices narrower than a fiftieth of the scene are not darkened. Ground of soil may reach
-//! far beyond what stands on it: then the sun has a second map, of that alone, and so has the sky.
+//! of the sky's maps is a [`COARSE`]th of the scene, so crevices narrower than a fiftieth of the scene are not darkened. Small pictures have
+//! fewer and coarser maps of the sky ([`Fineness`]). Ground of soil may reach far beyond what stands on it: then the sun has a second map, of
+//! that alone, and so has the sky.
 
 mod open_sky;
 
@@ -19,13 +20,18 @@ use dlsys_geometry::scene::Vector;
 pub(super) use open_sky::OpenSky;
 
 /// Places of the sky from which light comes; fewer where there are more triangles than [`MANY`].
-const PLACES: usize = 128;
 const FEW_PLACES: usize = 24;
 const MANY: usize = 500_000;
 /// Cells along the larger side of the maps.
 const FINEST: f64 = 3072.0;
 const LEAST: f64 = 256.0;
 const COARSE: f64 = 128.0;
+/// How much is computed of the light of the sky, by the pixels along the larger side of the picture.
+const FINENESSES: [Fineness; 3] = [
+    Fineness { pixels: 220.0, places: 32, cells: COARSE / 2.0, floor: 128 },
+    Fineness { pixels: 440.0, places: 64, cells: COARSE * 0.75, floor: 224 },
+    Fineness { pixels: f64::INFINITY, places: 128, cells: COARSE, floor: 320 },
+];
 /// The sun has a second map if that is so many times as fine.
 const FINER: f64 = 1.5;
 /// Cells of the coarse map by which the finer one reaches beyond what stands on the ground.
@@ -37,6 +43,27 @@ const RIM: f64 = 0.15;
 /// Bias of depths, in cells: on a surface that faces the light, and at most.
 const BIAS: f32 = 1.0;
 const SLOPE: f32 = 8.0;
+
+/// How much is computed of the light of the sky.
+#[derive(Clone, Copy)]
+pub(super) struct Fineness {
+    /// Of pictures that have no more pixels along their larger side than this.
+    pixels: f64,
+    /// Places of the sky.
+    places: usize,
+    /// Cells along the larger side of each map.
+    cells: f64,
+    /// Places along a side of the floor.
+    floor: usize,
+}
+
+impl Fineness {
+    /// Of a picture of so many pixels along its larger side.
+    pub(super) fn of(pixels: f64) -> Fineness {
+        let [.., finest] = FINENESSES;
+        FINENESSES.into_iter().find(|fineness| pixels <= fineness.pixels).unwrap_or(finest)
+    }
+}
 
 /// The vertices of a batch in a map, by coordinate: many are placed at once.
 #[derive(Default)]
@@ -209,20 +236,20 @@ impl Map {
 
     /// Where a point on a surface whose lit side has this normal is in the map: the cell whose middle is to its left and below, the part of
     /// a cell from there, and its depth; `None` outside of the map.
-    fn cell(&self, at: Vector, normal: Vector, around: i64) -> Option<([usize; 2], [f32; 2], f32)> {
+    fn cell(&self, at: Vector, normal: Vector, around: i32) -> Option<([usize; 2], [f32; 2], f32)> {
         let cos = normal.dot(&self.axes[2]).clamp(0.05, 1.0);
         let slope = ((1.0 - cos * cos).sqrt() / cos) as f32;
         // Off the surface by a cell, so that it does not hide itself where it bends.
         let [x, y, depth] = self.place(at - self.middle + normal * (1.0 / self.scale));
         let depth = depth + (BIAS * (1.0 + slope)).min(SLOPE);
         let (x, y) = (x - 0.5, y - 0.5);
-        let (left, bottom) = (x.floor(), y.floor());
-        let [width, height] = self.size.map(|side| side as i64);
-        let (column, row) = (left as i64, bottom as i64);
-        let is_within = |at: i64, side: i64| at >= around && at + around + 1 < side;
-        (is_within(column, width) && is_within(row, height)).then_some((
+        // Within the map towards zero is down.
+        let (column, row) = (x as i32, y as i32);
+        let is_within =
+            |x: f32, at: i32, side: usize| x >= 0.0 && at >= around && at < side as i32 - around - 1;
+        (is_within(x, column, self.size[0]) && is_within(y, row, self.size[1])).then_some((
             [column as usize, row as usize],
-            [x - left, y - bottom],
+            [x - column as f32, y - row as f32],
             depth,
         ))
     }
@@ -268,16 +295,22 @@ pub(super) struct Maps {
 
 impl Maps {
     /// Maps of the sun, if there is one in this direction, with so many cells for a scene unit, and of the sky.
-    pub(super) fn new(casters: &Casters, sun: Option<Vector>, scale: f64, threads: usize) -> Maps {
+    pub(super) fn new(
+        casters: &Casters,
+        sun: Option<Vector>,
+        scale: f64,
+        fineness: Fineness,
+        threads: usize,
+    ) -> Maps {
         let (around, core) = (casters.around(), casters.core());
-        let places = if casters.count() > MANY { FEW_PLACES } else { PLACES };
+        let places = if casters.count() > MANY { FEW_PLACES } else { fineness.places };
         let [middle, _] = around;
         let larger = |[_, half]: Reach| half.max();
         let is_far = larger(around) > FURTHER * larger(core);
         let sky = (0..places).map(|i| {
             let rim = if is_far { RIM * larger(core) } else { 0.0 };
             let within = if is_far { [core[0], core[1].add_scalar(rim)] } else { around };
-            let mut map = Map::new(middle, within, place_of_sky(i, places), 0.0, COARSE);
+            let mut map = Map::new(middle, within, place_of_sky(i, places), 0.0, fineness.cells);
             map.rim = (rim * map.scale) as f32;
             map
         });

@@ -333,6 +333,12 @@ impl<'m> Nursery<'m> {
         if scene.plants.len() + seedlings.len() > MOST_PLANTS {
             return Err(too_many(&plants[seedlings[0].plant], format!("more than {MOST_PLANTS} plants")));
         }
+        let is_scaled = |seedling: &&Seedling| {
+            seedling.placement.largest() != 1.0 && sways(&plants[seedling.plant].model)
+        };
+        if let Some(seedling) = seedlings.iter().find(is_scaled) {
+            return Err(of_own_size(&plants[seedling.plant]));
+        }
         let key = |seedling: &Seedling| {
             let own = seedling.seed.map_or(seed, number_of);
             (seedling.plant, if plants[seedling.plant].is_random { own } else { 0 })
@@ -488,6 +494,17 @@ fn within(plant: &model::Plant, message: String, inner: &Diagnostic) -> Diagnost
         format!("{}:{line}:{column}: ", plant.source.name)
     });
     Diagnostic::error(message).at(plant.span, "this plant").note(format!("{place}{}", inner.message))
+}
+
+/// Forces and falls are those of the size that a model declares.
+fn of_own_size(plant: &model::Plant) -> DrawError {
+    let error =
+        Diagnostic::error("a plant that moves in the wind, or lets something go, has the size of its model")
+            .at(plant.span, "this plant is drawn with another size");
+    DrawError::Plant(Box::new(error.help(format!(
+        "leave out the third parameter of `{}`, and change the lengths in its model",
+        plant.name
+    ))))
 }
 
 pub(crate) fn too_many(plant: &model::Plant, what: String) -> DrawError {

@@ -9,6 +9,7 @@ mod string;
 use std::sync::Arc;
 
 use crate::declarations::Declaration;
+pub use crate::foreign_lines::Stray;
 use dlsys_diagnostic::Span;
 use dlsys_expr::Sort;
 pub use expression::{Aggregate, Expr, ExprId, Expression, Expressions, Operator};
@@ -483,6 +484,8 @@ pub struct Document {
     /// Comments such as `#(2)` in strings, which set the width of lines in cpfg: the place, and the text in the
     /// parentheses.
     pub commented_widths: Vec<(Span, String)>,
+    /// Signs in strings that end something in C: comments, continued lines, declarations.
+    pub strays: Vec<(Span, Stray)>,
     /// Index of the first item of the library, if it was included. Names that the model declares itself take precedence
     /// over those of the library, and unused library functions are not reported.
     pub library: Option<usize>,

@@ -23,6 +23,15 @@ impl Files for NoFiles {
     }
 }
 
+/// Why a path cannot be read: it leaves the folder in which it begins, or is written as on Windows. `None` if it can.
+pub fn fault_of_path(path: &str) -> Option<&'static str> {
+    match (path.contains('\\'), is_inside(path)) {
+        (true, _) => Some("folders in a path are separated by `/`, not by `\\`"),
+        (false, false) => Some("the path leaves the model's folder"),
+        (false, true) => None,
+    }
+}
+
 /// True if a relative path never leaves the folder in which it begins.
 pub fn is_inside(path: &str) -> bool {
     let inside = Path::new(path).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));

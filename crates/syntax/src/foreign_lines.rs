@@ -74,6 +74,57 @@ pub fn comment(text: &str) -> Option<Diagnostic> {
     None
 }
 
+/// A sign that ends something in C, where it is a module of a string here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stray {
+    /// `// words`, two rolls and modules.
+    Comment,
+    /// `\` at the end of a line, a roll.
+    Continuation,
+    /// `;` at the end of a line, a colour.
+    End,
+}
+
+/// The places of such signs: where a line would be strange without them being meant as in C.
+pub fn strays(text: &str) -> Vec<(usize, Stray)> {
+    let mut found = Vec::new();
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        let code = line.split('#').next().unwrap_or_default().trim_end();
+        if !code.contains('"') {
+            found.extend(stray(code).map(|(at, stray)| (start + at, stray)));
+        }
+        start += line.len();
+    }
+    found
+}
+
+fn stray(code: &str) -> Option<(usize, Stray)> {
+    if let Some(at) = code.find("//")
+        && !code[at + 2..].starts_with('/')
+    {
+        let (before, behind) = (&code[..at], &code[at + 2..]);
+        let mut words = behind.split_whitespace();
+        let is_prose = |word: &str| word.len() > 1 && word.starts_with(|c: char| c.is_lowercase());
+        let has_signs = behind.contains(|c: char| "[]{}()+&^|!@;\\/".contains(c));
+        let is_apart = behind.starts_with(char::is_whitespace) && before.chars().all(|c| c != '/');
+        let is_word = behind.trim_start().starts_with(char::is_alphabetic);
+        let begins = before.trim().is_empty() && is_word;
+        let ends = before.ends_with(char::is_whitespace) && !has_signs && words.any(is_prose);
+        if is_apart && (begins || ends) {
+            return Some((at, Stray::Comment));
+        }
+    }
+    if let Some(before) = code.strip_suffix('\\')
+        && before.ends_with(char::is_whitespace)
+    {
+        return Some((before.len(), Stray::Continuation));
+    }
+    let before = code.strip_suffix(';')?;
+    let is_behind = before.ends_with(|c: char| c.is_alphanumeric() || ")]}".contains(c));
+    is_behind.then_some((before.len(), Stray::End))
+}
+
 /// The first line of a text, not too long for a message.
 fn first_line(text: &str) -> String {
     text.trim().lines().next().unwrap_or_default().trim().chars().take(60).collect()
@@ -102,6 +153,27 @@ mod tests {
             ["p1 : t > 3 -> F", "A(x) : x > 0.3 -> F(x)", "A -> 0.3: F A or 0.7: F", "A : * -> F(0.3)"]
         {
             assert!(rule(text, 0).is_none(), "{text}");
+        }
+    }
+
+    #[test]
+    fn stray_signs_of_c_are_told_from_modules() {
+        let found = |text: &str| strays(text).into_iter().map(|(at, _)| at).collect::<Vec<_>>();
+        assert_eq!(strays("A -> F A  // leaf L\n"), [(10, Stray::Comment)]);
+        assert_eq!(strays("A -> F\n// F"), [(7, Stray::Comment)]);
+        assert_eq!(strays("axiom: A(0)  \\\nB(1)"), [(13, Stray::Continuation)]);
+        assert_eq!(strays("axiom: A;\nA -> F[A];  # rule"), [(8, Stray::End), (19, Stray::End)]);
+        for text in [
+            "A -> [F] ///// F",
+            "A -> F // F",
+            "A -> F // [ leaf ]",
+            "A -> F//(30)F",
+            "A -> F \\ F",
+            "A -> F ;",
+            "A -> ε",
+            "# a // b",
+        ] {
+            assert_eq!(found(text), [], "{text}");
         }
     }
 

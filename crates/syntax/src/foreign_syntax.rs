@@ -8,7 +8,8 @@ use dlsys_diagnostic::{Diagnostic, Span};
 const PAGE: &str = "the book has a page for this: “Coming from cpfg or L-Py”, docs/src/moving.md";
 
 /// Beginnings of lines, as words and signs, each with its remedy.
-const LINES: [(&[&str], &str); 33] = [
+const LINES: [(&[&str], &str); 34] = [
+    (&["elif"], ELIF),
     (&["lsystem", ":"], "remove this line: a file is one model, from its first line to its last"),
     (&["endlsystem"], "remove this line: a model ends with its file"),
     (&["axiom", ":"], "small letters: `axiom: …`, or `initial string: …`"),
@@ -71,6 +72,7 @@ const LINES: [(&[&str], &str); 33] = [
     (&["return"], "a model is no program: a function is one expression: `def f(x) = x^2`"),
 ];
 
+const ELIF: &str = "every clause begins with `if …`, without a colon behind the condition; of several `solve` clauses the first whose condition holds is active";
 const STEPS: &str = "there are no derivation steps; write the times to look at: `frames 0 .. N step 1`; `dlsys render MODEL --at N` draws the last one alone. Discrete rules apply at t = 1, 2, …";
 const RULES: &str = "remove this line: rules stand among declarations, `A(x): if x = 1 produce F(x) A(0)`, or discrete `A(x) : x > 3 -> F(x) A(0)`";
 const PRODUCE: &str = "a clause has one successor, and strings are not put together by statements: `if x = 1 produce F(x) A(0)`; modules that repeat are productions of their own";
@@ -253,12 +255,19 @@ pub fn function(name: &str, arguments: &[String]) -> Option<String> {
         "trunc" | "int" => format!("floor({})", argument(0, "x")),
         "fmod" => {
             let (x, y) = (argument(0, "x"), argument(1, "y"));
-            return Some(format!("a remainder is written `{x} - {y}*floor(({x})/({y}))`"));
+            return Some(remainder(&x, &y));
         }
         "fabs" => format!("abs({})", argument(0, "x")),
         _ => return None,
     };
     Some(format!("write `{call}`"))
+}
+
+/// How a remainder is written.
+pub fn remainder(x: &str, y: &str) -> String {
+    let is_simple = |text: &str| text.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '.'));
+    let grouped = |text: &str| if is_simple(text) { text.to_owned() } else { format!("({text})") };
+    format!("a remainder is written `{x} - {y}*floor({x}/{y})`", x = grouped(x), y = grouped(y))
 }
 
 /// Names and values in lines such as `#define K 0.5`, which are comments in this language.

@@ -32,8 +32,10 @@ pub fn read(source: &Source, files: &dyn Files) -> (Option<Source>, Document, Ve
     let mut whole = None;
     let items = if includes {
         let source = whole.insert(source.clone());
-        let mut inclusion =
-            Inclusion { reader: &mut reader, source, files, chain: vec![], seen: HashMap::new() };
+        // Paths begin at the folder of the model.
+        let own = Path::new(&source.name).file_name().unwrap_or_default().to_string_lossy();
+        let chain = vec![(own.as_ref().into(), None)];
+        let mut inclusion = Inclusion { reader: &mut reader, source, files, chain, seen: HashMap::new() };
         inclusion.expand(items)
     } else {
         items
@@ -78,8 +80,8 @@ struct Inclusion<'i> {
     reader: &'i mut Reader,
     source: &'i mut Source,
     files: &'i dyn Files,
-    /// The files that are being read, each with the place of its `include`.
-    chain: Vec<(Arc<str>, Span)>,
+    /// The files that are being read, each with the place of its `include`; the model itself has none.
+    chain: Vec<(Arc<str>, Option<Span>)>,
     /// The files that have been read.
     seen: HashMap<Arc<str>, Span>,
 }
@@ -102,7 +104,7 @@ impl Inclusion<'_> {
             Ok(Some((name, text))) => {
                 let start = self.source.include(&*name, &text);
                 self.seen.insert(name.clone(), file.span);
-                self.chain.push((name, file.span));
+                self.chain.push((name, Some(file.span)));
                 let items = self.reader.read(&padded(start, &text));
                 let items = self.expand(items);
                 self.chain.pop();
@@ -120,8 +122,8 @@ impl Inclusion<'_> {
     fn open(&self, file: &Text) -> Result<Option<(Arc<str>, String)>, Box<Diagnostic>> {
         let fault =
             |what: &str| Diagnostic::error(format!("`{}` cannot be included", file.text)).at(file.span, what);
-        if !crate::is_inside(&file.text) {
-            return Err(Box::new(fault("the path leaves the model's folder").help(
+        if let Some(why) = crate::fault_of_path(&file.text) {
+            return Err(Box::new(fault(why).help(
                 "included files stand in the folder of the model or below it, or in a folder given with `--include-path DIR`, \
                  and their paths begin there",
             )));
@@ -130,16 +132,22 @@ impl Inclusion<'_> {
         if let Some(at) = self.chain.iter().position(|(known, _)| *known == name) {
             let mut circle: Vec<&str> = self.chain[at..].iter().map(|(name, _)| &**name).collect();
             circle.push(&name);
-            return Err(Box::new(
-                fault(&format!("this closes the circle {}", circle.join(" → ")))
-                    .at(self.chain[at].1, "it is being included from here")
-                    .help("put what both need into a third file, and include that in both"),
-            ));
+            let mut error = fault(&match circle[..] {
+                [_, _] => "this file includes itself".to_owned(),
+                _ => format!("this closes the circle {}", circle.join(" → ")),
+            });
+            if let Some(span) = self.chain[at].1 {
+                error = error.at(span, "it is being included from here");
+            }
+            return Err(Box::new(error.help(match circle[..] {
+                [_, _] => "remove this line",
+                _ => "put what both need into a third file, and include that in both",
+            })));
         }
         if self.seen.contains_key(&name) {
             return Ok(None);
         }
-        if self.chain.len() >= MAX_DEPTH {
+        if self.chain.len() > MAX_DEPTH {
             let what = format!("files include one another more than {MAX_DEPTH} deep");
             return Err(Box::new(fault(&what).help("include it from a file nearer to the model")));
         }

@@ -36,6 +36,6 @@ pub mod suggest;
 pub mod words;
 
 pub use error::Errors;
-pub use files::{Files, NoFiles, is_inside};
+pub use files::{Files, NoFiles, fault_of_path, is_inside};
 pub use include::{library_names, read};
 pub use layout::MAX_DEPTH;

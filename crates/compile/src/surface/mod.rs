@@ -15,7 +15,7 @@ pub use net::{Net, read as read_net};
 pub use picture::{read as read_picture, within_limit};
 
 use dlsys_model::SurfaceShape;
-use dlsys_syntax::{Files, is_inside};
+use dlsys_syntax::{Files, fault_of_path};
 
 /// Maximum size of a surface file, in bytes.
 pub const SIZE_LIMIT: u64 = 64 << 20;
@@ -49,8 +49,8 @@ impl SurfaceError {
 
 /// Reads a surface, with places of its vertices in a picture if there is one on it; the caller fills in its name, its place and the picture.
 pub fn read(path: &str, has_picture: bool, files: &dyn Files) -> Result<SurfaceShape, SurfaceError> {
-    if !is_inside(path) {
-        return Err(SurfaceError::whole("the path leaves the model's folder")
+    if let Some(why) = fault_of_path(path) {
+        return Err(SurfaceError::whole(why)
             .help("surfaces stand in the folder of the model or below it, as in `\"surfaces/petal.s\"`"));
     }
     let extension = Path::new(path).extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);

@@ -3,7 +3,7 @@
 use super::{PART_LIMIT, SIZE_LIMIT, SurfaceError, number, shown};
 use std::path::Path;
 
-use dlsys_syntax::{Files, is_inside};
+use dlsys_syntax::{Files, fault_of_path};
 
 /// A mesh of faces and cords, with the lines of the file on which they stand, from 1.
 #[derive(Debug, Default)]
@@ -18,8 +18,8 @@ pub struct Net {
 
 /// Reads the mesh of a sheet.
 pub fn read(path: &str, files: &dyn Files) -> Result<Net, SurfaceError> {
-    if !is_inside(path) {
-        return Err(SurfaceError::whole("the path leaves the model's folder")
+    if let Some(why) = fault_of_path(path) {
+        return Err(SurfaceError::whole(why)
             .help("meshes stand in the folder of the model or below it, as in `\"meshes/net.obj\"`"));
     }
     let extension = Path::new(path).extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);

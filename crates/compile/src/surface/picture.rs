@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::SurfaceError;
 use dlsys_model::Picture;
-use dlsys_syntax::{Files, is_inside};
+use dlsys_syntax::{Files, fault_of_path};
 
 /// Maximum size of the file of a picture, in bytes.
 const FILE_LIMIT: u64 = 32 << 20;
@@ -16,8 +16,8 @@ const TEXEL_LIMIT: usize = 4 << 24;
 
 /// Reads a picture.
 pub fn read(path: &str, files: &dyn Files) -> Result<Picture, SurfaceError> {
-    if !is_inside(path) {
-        return Err(SurfaceError::whole("the path leaves the model's folder")
+    if let Some(why) = fault_of_path(path) {
+        return Err(SurfaceError::whole(why)
             .help("pictures stand in the folder of the model or below it, as in `\"organs/leaf.png\"`"));
     }
     let file = files.read(Path::new(path), FILE_LIMIT).map_err(|what| {

@@ -174,8 +174,9 @@ impl Command {
             | Command::Petal
             | Command::Bud
             | Command::Ball
+            | Command::Plant(_)
             | Command::Surface(_) => 3,
-            Command::Color | Command::Plant(_) => 2,
+            Command::Color => 2,
             Command::Draw
             | Command::Move
             | Command::Hop

@@ -26,7 +26,7 @@
 //! | `@L(s)` `@K(s)` `@P(s)` `@B(s)` | a leaf, a flower, a petal, a bud of size `s` (1), or any surface that the model declares; nothing if `s` is not positive |
 //! | `@O(d)` | a ball of diameter `d` (1) around the turtle |
 //! | `@L(w, l, h)` | the same for each surface: its width (to the left), length (along the heading) and height (up) in parts of its own; `@L(w, l)` is `@L(w, l, l)` |
-//! | `@NAME(b, s)` | a plant of another model, declared by `plant @NAME from …`, as it is at its time t - b; `s` is its seed |
+//! | `@NAME(b, s, k)` | a plant of another model, declared by `plant @NAME from …`, as it is at its time t - b; `s` is its seed, `k` how many times as large it is as in its model (1), nothing if that is not positive |
 //! | `@NAME` | a sheet, declared by `sheet @NAME from …`, whose coordinates are the turtle's: `x` to the right, `y` along the heading, `z` up |
 //! | `@D` | what follows, to the end of the branch, is free since the birth of the module that holds it: it falls, flutters, lands |
 //! | `@G` | the turtle is set down on the ground; `x`, `z` and its directions stay |

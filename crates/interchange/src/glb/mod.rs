@@ -18,6 +18,7 @@ use serde_json::json;
 use crate::life::{Life, Shape};
 use crate::mesh::{Cutter, Layout, Places};
 use crate::motion::{Clock, Moved};
+use crate::stand::Look;
 use crate::stem::Corner;
 use crate::{Error, Growth, linear};
 use buffer::{Buffer, Kind};
@@ -111,11 +112,45 @@ impl Writer<'_> {
                 self.document.nodes.push(node);
             }
         }
+        self.stands();
         self.gases(&mut animation);
         if !animation.channels.is_empty() {
             self.document.animations.push(animation);
         }
         self.floor();
+    }
+
+    /// The plants of other models: those of one look share a mesh.
+    fn stands(&mut self) {
+        let growth = self.growth;
+        let meshes: Vec<usize> = growth.stands.looks.iter().map(|look| self.look(look)).collect();
+        for stand in &growth.stands.stands {
+            let kind = plain_name(&stand.kind);
+            let translation: [f32; 3] = stand.frame.origin.coords.map(|x| x as f32).into();
+            let rotation: [f32; 4] = stand.frame.turn.coords.map(|x| x as f32).into();
+            let scale = stand.scales.map(|x| x as f32);
+            let number = self.document.nodes.len();
+            self.document.nodes[0].children.push(number);
+            self.document.nodes.push(Node {
+                name: name(&kind, &stand.lineage.name(), 0),
+                mesh: Some(meshes[stand.look]),
+                translation: Some(translation).filter(|at| *at != [0.0; 3]),
+                rotation: Some(rotation).filter(|turn| *turn != [0.0, 0.0, 0.0, 1.0]),
+                scale: Some(scale).filter(|scale| *scale != [1.0; 3]),
+                extras: Some(json!({ "kind": *stand.kind, "lineage": stand.lineage.to_string() })),
+                ..Node::default()
+            });
+        }
+    }
+
+    /// The mesh of a look.
+    fn look(&mut self, look: &Look) -> usize {
+        let layout = self.cutter.layout(&look.form, &look.paint, std::slice::from_ref(&look.numbers));
+        let places = layout.places(&look.numbers);
+        let primitives = self.primitives(&layout, &[places]);
+        let number = self.document.meshes.len();
+        self.document.meshes.push(Mesh { name: format!("{}-{number}", plain_name(&look.kind)), primitives });
+        number
     }
 
     /// The mesh of a life.

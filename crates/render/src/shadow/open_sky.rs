@@ -11,7 +11,7 @@
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::{BIAS, Map, Maps, SLOPE};
+use super::{BIAS, Fineness, Map, Maps, SLOPE};
 use crate::casters::Reach;
 use dlsys_geometry::scene::Vector;
 
@@ -28,22 +28,28 @@ pub(crate) struct OpenSky {
     low: [f64; 2],
     /// Cells in a scene unit.
     scale: f64,
+    /// Places along a side of the grid.
+    side: usize,
     /// By row.
     parts: Vec<f32>,
 }
 
 impl OpenSky {
-    /// Places along a side of the grid.
-    const SIDE: usize = 320;
     /// How far the grid reaches beyond the box around everything, in parts of its height.
     const BEYOND: f64 = 1.5;
 
     /// Of a floor at this height, below a box with all that casts shadows.
-    pub(crate) fn new(maps: &Maps, [middle, half]: Reach, height: f64, threads: usize) -> OpenSky {
+    pub(crate) fn new(
+        maps: &Maps,
+        [middle, half]: Reach,
+        height: f64,
+        fineness: Fineness,
+        threads: usize,
+    ) -> OpenSky {
         let reach = half.x.max(half.z) + OpenSky::BEYOND * (middle.y + half.y - height).max(0.0);
         let reach = if reach > 0.0 { reach } else { 1.0 };
         let low = [middle.x - reach, middle.z - reach];
-        let side = OpenSky::SIDE;
+        let side = fineness.floor;
         let scale = (side - 1) as f64 / (2.0 * reach);
         let count = maps.sky.len();
         let shades = side_by_side(count, threads, |i| Shade::new(&maps.sky[i], height, count));
@@ -57,20 +63,20 @@ impl OpenSky {
             open.iter_mut().for_each(|part| *part = (*part * 2.0 / count.max(1) as f32).min(1.0));
             open
         };
-        OpenSky { low, scale, parts: side_by_side(side, threads, row).concat() }
+        OpenSky { low, scale, side, parts: side_by_side(side, threads, row).concat() }
     }
 
     /// The part at a place; 1 beyond the grid, to which it rises at the rim.
     pub(crate) fn at(&self, place: Vector) -> f64 {
         let [x, z] = [(place.x - self.low[0]) * self.scale, (place.z - self.low[1]) * self.scale];
-        let last = (OpenSky::SIDE - 1) as f64;
+        let last = (self.side - 1) as f64;
         let rim = x.min(z).min(last - x).min(last - z) / (0.2 * last);
         if rim.is_nan() || rim <= 0.0 {
             return 1.0;
         }
-        let [column, row] = [x, z].map(|x| (x as usize).min(OpenSky::SIDE - 2));
+        let [column, row] = [x, z].map(|x| (x as usize).min(self.side - 2));
         let (u, v) = (x - column as f64, z - row as f64);
-        let value = |column: usize, row: usize| f64::from(self.parts[row * OpenSky::SIDE + column]);
+        let value = |column: usize, row: usize| f64::from(self.parts[row * self.side + column]);
         let line = |row: usize| value(column, row) * (1.0 - u) + value(column + 1, row) * u;
         let part = line(row) * (1.0 - v) + line(row + 1) * v;
         1.0 - (1.0 - part) * rim.min(1.0)

@@ -1,7 +1,7 @@
 //! Outlines of sets of cells: followed along the edges of cells, then simplified.
 
 /// A set of cells of a raster. None is at the rim of the raster.
-pub struct Mask<I, F, G> {
+pub struct Mask<I, F, G, H> {
     /// Cells in a row of the raster.
     pub width: usize,
     /// Whether a cell belongs to the set; none beyond the raster does.
@@ -10,6 +10,8 @@ pub struct Mask<I, F, G> {
     pub covered: F,
     /// Of a cell of the same item: how much lighter it is than the darkest that belong to the set.
     pub shade: G,
+    /// Of a cell that does not belong to the set: how exactly an outline beside it has to be kept if that runs under what is painted later.
+    pub hidden: H,
 }
 
 /// An outline of a set, as it is followed.
@@ -35,6 +37,24 @@ pub enum Part {
     Item,
 }
 
+/// How much room an outline has under what is painted later.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Hidden {
+    /// As much as the margin of a region.
+    Amid,
+    /// Little: beside it, something is seen that was painted before.
+    NearEdge,
+}
+
+impl Hidden {
+    fn tolerance(self) -> f64 {
+        match self {
+            Hidden::Amid => TOLERANCE_HIDDEN,
+            Hidden::NearEdge => TOLERANCE_NEAR_EDGE,
+        }
+    }
+}
+
 /// A place that an outline passes, no further than a tolerance.
 #[derive(Clone, Copy)]
 struct Place {
@@ -50,15 +70,17 @@ const TOLERANCE_INSIDE: f64 = 0.9;
 const STRIP: f64 = 0.4;
 const LEAST_TOLERANCE: f64 = 0.02;
 const TOLERANCE_HIDDEN: f64 = 1.5;
+const TOLERANCE_NEAR_EDGE: f64 = 0.8;
 
 /// A corner of an outline, in cells from the upper left corner of the mask.
 pub type Corner = [f64; 2];
 
-impl<I, F, G> Mask<I, F, G>
+impl<I, F, G, H> Mask<I, F, G, H>
 where
     I: Fn(usize) -> bool,
     F: Fn(usize, Part) -> f64,
     G: Fn(usize) -> Option<f64>,
+    H: Fn(usize) -> Option<Hidden>,
 {
     /// Whether an outline passes above a cell, to the right.
     pub fn is_top(&self, cell: usize) -> bool {
@@ -72,7 +94,9 @@ where
             if high == low { 0.5 } else { (high - 0.5) / (high - low) }
         };
         let covered = |cell: usize, part: Part| (self.covered)(cell, part);
+        let hidden = (self.hidden)(outer);
         let (t, tolerance) = match ((self.shade)(inner), (self.shade)(outer)) {
+            _ if hidden.is_some() => (0.5, hidden.map_or(TOLERANCE, Hidden::tolerance)),
             // A lighter shade is painted over it.
             (_, Some(low)) if low >= 0.0 => (0.5, TOLERANCE_HIDDEN),
             (Some(high), Some(low)) => {
@@ -187,11 +211,12 @@ mod tests {
     use super::*;
 
     /// The outlines of a set in a raster of so many columns, whose rim is empty.
-    fn outlines<I, F, G>(mask: &Mask<I, F, G>, count: usize) -> Vec<Vec<Corner>>
+    fn outlines<I, F, G, H>(mask: &Mask<I, F, G, H>, count: usize) -> Vec<Vec<Corner>>
     where
         I: Fn(usize) -> bool,
         F: Fn(usize, Part) -> f64,
         G: Fn(usize) -> Option<f64>,
+        H: Fn(usize) -> Option<Hidden>,
     {
         let mut begun = vec![false; count];
         let mut outlines = Vec::new();
@@ -211,6 +236,7 @@ mod tests {
             inside: |i: usize| inside.get(i) == Some(&true),
             covered,
             shade: |_| None,
+            hidden: |_| None,
         };
         outlines(&mask, inside.len())
     }
@@ -243,7 +269,7 @@ mod tests {
     #[test]
     fn holes_are_told_from_outlines() {
         let inside = |i: usize| (1..6).contains(&(i % 7)) && (1..6).contains(&(i / 7)) && i != 24;
-        let mask = Mask { width: 7, inside, covered: |_, _| 0.0, shade: |_| None };
+        let mask = Mask { width: 7, inside, covered: |_, _| 0.0, shade: |_| None, hidden: |_| None };
         assert!(!mask.follow(8, |_| ()).is_hole);
         assert!(mask.follow(24 + 7, |_| ()).is_hole);
     }
@@ -258,7 +284,7 @@ mod tests {
         let parts = [0.0, 1.0, 0.75, 0.0, 0.0];
         let inside = |i: usize| (1..3).contains(&(i / 5)) && parts[i % 5] > 0.5;
         let covered = |i: usize, _| if inside(i) { parts[i % 5] } else { 0.0 };
-        let outlines = outlines(&Mask { width: 5, inside, covered, shade: |_| None }, 20);
+        let outlines = outlines(&Mask { width: 5, inside, covered, shade: |_| None, hidden: |_| None }, 20);
         let right = outlines[0].iter().fold(0.0_f64, |right, p| right.max(p[0]));
         assert!((right - 2.75).abs() < 0.1, "{outlines:?}");
     }
@@ -268,7 +294,8 @@ mod tests {
         let row = |rows: &[usize], i: usize| rows.contains(&(i / 20)) && (1..19).contains(&(i % 20));
         let strip = |i: usize| row(&[2], i);
         let covered = |i: usize, _| if strip(i) { 0.4 } else { 0.0 };
-        let found = outlines(&Mask { width: 20, inside: strip, covered, shade: |_| None }, 100);
+        let found =
+            outlines(&Mask { width: 20, inside: strip, covered, shade: |_| None, hidden: |_| None }, 100);
         assert!(found.len() == 1 && (area(&found[0]) / 0.4 - 17.0).abs() <= 1.0, "{found:?}");
 
         let sides = |i: usize| row(&[1, 2, 4, 5], i);
@@ -276,7 +303,8 @@ mod tests {
             3 if row(&[3], i) => 0.7,
             _ => f64::from(u8::from(sides(i))),
         };
-        let found = outlines(&Mask { width: 20, inside: sides, covered, shade: |_| None }, 140);
+        let found =
+            outlines(&Mask { width: 20, inside: sides, covered, shade: |_| None, hidden: |_| None }, 140);
         let low = found[0].iter().fold(0.0_f64, |low, p| low.max(p[1]));
         let high = found[1].iter().fold(9.0_f64, |high, p| high.min(p[1]));
         assert!((high - low - 0.3).abs() < 1e-9, "{found:?}");
@@ -290,7 +318,8 @@ mod tests {
             if is_rim(i) { 0.0 } else { part }
         };
         let inside = |i: usize| covered(i, Part::Item) >= 0.5;
-        let outlines = outlines(&Mask { width: 40, inside, covered, shade: |_| None }, 1600);
+        let outlines =
+            outlines(&Mask { width: 40, inside, covered, shade: |_| None, hidden: |_| None }, 1600);
         // The corners are cut; the edge itself has a corner at most.
         assert!(outlines.len() == 1 && outlines[0].len() <= 9, "{outlines:?}");
     }
@@ -300,7 +329,7 @@ mod tests {
         let shade = |i: usize| 2.2 - ((i % 5) as f64 + 0.5);
         let inside = |i: usize| shade(i) > 0.0;
         let covered = |i: usize, part| if part == Part::Item || inside(i) { 1.0 } else { 0.0 };
-        let mask = Mask { width: 5, inside, covered, shade: |i| Some(shade(i)) };
+        let mask = Mask { width: 5, inside, covered, shade: |i| Some(shade(i)), hidden: |_| None };
         // Between the second and the third column.
         let [x, y] = mask.crossing(11, 12).at;
         assert!((x - 2.2).abs() < 1e-9 && y == 2.5, "{x} {y}");

@@ -1,10 +1,10 @@
 //! Regions of one module and one shade, as sets of cells of a raster.
 //!
 //! Regions are painted one over the other, in order. Each covers its own cells, and reaches under those that are painted later:
-//! by a margin, so that no background shows through where two outlines meet; and through holes, so that an outline within another is
-//! needed once only. A region is worked on piece by piece (cells that hang together), and the work on a piece is that of its cells.
+//! by a margin, so that no background shows through where two outlines meet, but not along an edge of those, where two half-transparent
+//! edges would lie over one another; and through holes, so that an outline within another is needed once only. A region is worked on piece by piece (cells that hang together), and the work on a piece is that of its cells.
 
-use super::contour::{Corner, Mask, Part};
+use super::contour::{Corner, Hidden, Mask, Part};
 use super::memory::{Rasters, filled};
 
 /// The width of the margin, in cells.
@@ -201,14 +201,21 @@ impl Regions {
     }
 
     /// Adds the cells near the rim of a piece that are painted later. Other pieces of the region have the same colour, so it does not matter
-    /// which of the two covers a cell.
+    /// which of the two covers a cell. Near places where what is painted later ends at something that was painted before, it adds only the
+    /// cells that touch the piece: two half-transparent edges, one over the other, cover more than one.
     fn spread(&self, label: u32, number: u32, inside: &mut [u32], rim: &mut Vec<usize>) {
         let mut from = 0;
-        for _ in 0..MARGIN {
+        for ring in 0..MARGIN {
             let end = rim.len();
             for at in from..end {
-                for other in self.around(rim[at]) {
-                    if inside[other] != number && self.is_free(other, label) {
+                let cell = rim[at];
+                let beside = self.around(cell).into_iter();
+                let others = beside.chain(self.corners(cell).into_iter().filter(|_| ring == 0));
+                for other in others {
+                    let is_free = inside[other] != number
+                        && self.is_free(other, label)
+                        && (ring == 0 || self.is_amid(other, label));
+                    if is_free {
                         inside[other] = number;
                         rim.push(other);
                     }
@@ -222,6 +229,14 @@ impl Regions {
     fn is_free(&self, cell: usize, label: u32) -> bool {
         let other = self.labels[cell];
         other != NOTHING && other >= label
+    }
+
+    /// Whether nothing painted before a region shows in a cell, nor in those around it.
+    fn is_amid(&self, cell: usize, label: u32) -> bool {
+        let item = self.items[label as usize];
+        let is_later = |sample: &Sample| sample.item != NOTHING && sample.item >= item;
+        let is_whole = |cell: usize| self.samples_of(cell).is_none_or(|samples| samples.iter().all(is_later));
+        is_whole(cell) && self.around(cell).into_iter().all(is_whole)
     }
 
     /// Adds the cells of a hole, one of which is given, to a piece if all of them are painted later. False if not.
@@ -265,8 +280,12 @@ impl Regions {
                 let is_own = self.items.get(self.labels[cell] as usize) == Some(&item);
                 is_own.then(|| f64::from(self.strengths[cell]) - self.least[label as usize])
             };
-            let mask =
-                Mask { width: self.width, inside: |cell| inside.get(cell) == Some(&number), covered, shade };
+            let hidden = |cell: usize| {
+                let is_under = inside[cell] != number && self.is_free(cell, label);
+                is_under.then(|| if self.is_amid(cell, label) { Hidden::Amid } else { Hidden::NearEdge })
+            };
+            let inside = |cell| inside.get(cell) == Some(&number);
+            let mask = Mask { width: self.width, inside, covered, shade, hidden };
             if begun[cell] == number || !mask.is_top(cell) {
                 continue;
             }
@@ -326,6 +345,27 @@ mod tests {
         assert_eq!(outlines.iter().map(Vec::len).collect::<Vec<_>>(), [1, 1, 1], "{outlines:?}");
         let reach = |outline: &[Corner]| outline.iter().fold(0.0_f64, |reach, p| reach.max(p[0]));
         assert!(reach(&outlines[0][0]) > 10.0 && (reach(&outlines[1][0]) - 10.0).abs() < 0.6);
+    }
+
+    #[test]
+    fn a_region_does_not_follow_the_edge_of_what_comes_later() {
+        let mut of = regions(&["000011111111"; 8]);
+        of.per_cell = 4;
+        // Half of each cell in the first row is background.
+        for column in 1..13 {
+            let cell = of.width + column;
+            of.places[cell] = column as u32;
+            let item = of.labels[cell];
+            of.samples.extend([item, item, NOTHING, NOTHING].map(|item| Sample { item, step: 0 }));
+        }
+        let outlines = of.outlines(2, &mut Rasters::default());
+        let reach = |upto: f64| {
+            let within = outlines[0][0].iter().filter(|[_, y]| *y < upto);
+            within.fold(0.0_f64, |reach, [x, _]| reach.max(*x))
+        };
+        // A cell along the edge, and the whole margin further down.
+        let (edge, below) = (reach(2.6), reach(9.0));
+        assert!(edge <= 5.6 && below >= 7.4, "{edge} {below}: {outlines:?}");
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! A text as lines of pieces. A piece is a token of the grammar, so that the formatter never splits one.
 
-use crate::declarations::Body;
+use std::collections::HashSet;
+
+use crate::declarations::{Body, Named};
 use crate::layout::{ItemKind, RawItem, lexemes};
 use crate::lexeme::{Lexeme, Token};
 
@@ -58,7 +60,8 @@ pub struct Line<'t> {
 /// The lines of a text.
 pub fn lines(text: &str) -> Vec<Line<'_>> {
     let (layout, lexemes) = lexemes(text);
-    let mut reader = Reader { text, items: &layout.items, lexemes: &lexemes, next: 0, item: 0 };
+    let functions = functions(text, &layout.items);
+    let mut reader = Reader { text, items: &layout.items, lexemes: &lexemes, functions, next: 0, item: 0 };
     let mut lines = Vec::new();
     let mut start = 0;
     while start < text.len() {
@@ -75,10 +78,21 @@ pub fn lines(text: &str) -> Vec<Line<'_>> {
     lines
 }
 
+/// The names of the functions that a text declares.
+fn functions<'t>(text: &'t str, items: &[RawItem]) -> HashSet<&'t str> {
+    let defined = items.iter().filter(|item| {
+        item.kind.declaration().is_some_and(|declaration| declaration.named == Named::Function)
+    });
+    let name = |item: &RawItem| text.get(item.start..item.end)?.split_once('(')?.0.split_whitespace().nth(1);
+    defined.filter_map(name).collect()
+}
+
 struct Reader<'t, 'l> {
     text: &'t str,
     items: &'l [RawItem],
     lexemes: &'l [Lexeme],
+    /// Names of functions that the text declares: `step` is a word of `frames`, and may be one.
+    functions: HashSet<&'t str>,
     /// Index of the next lexeme, and number of the current item, from 1.
     next: usize,
     item: usize,
@@ -99,6 +113,9 @@ impl<'t> Reader<'t, '_> {
             column += self.text[counted..first.start].chars().count();
             counted = first.start;
             let touches = last == first.start && !pieces.is_empty();
+            let is_call = self.text[until..].starts_with('(')
+                && self.functions.contains(&self.text[first.start..until]);
+            operator &= !is_call;
             if let Some(number) = pieces.last_mut()
                 && touches
                 && number.token == Token::Number

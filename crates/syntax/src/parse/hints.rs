@@ -157,6 +157,7 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (Some('|'), "|") if touching => "“or” is written with one `|`",
         (Some('*'), "*") if touching => "a power is written `x^2`",
         (_, "?") => "a choice between numbers is written `if x > 1 then x else 0`",
+        (_, "%") if item == Rule::step_item => return Some(hint_of_remainder(before, &text[at + 1..])),
         (_, _) if item == Rule::step_item => return hint_for_step(text, at, found),
         (Some('-'), ">") if touching => ARROW,
         (_, "→") => ARROW,
@@ -169,6 +170,7 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (_, "[") if item != Rule::modules && previous.is_some_and(|c| "+-*/(=,^".contains(c)) => {
             "in expressions only round parentheses `( )` group"
         }
+        (_, "%") if !in_string(item, before) => return Some(hint_of_remainder(before, &text[at + 1..])),
         (_, "±") => "`±` stands for both turns in the head of a rule only; write `+` or `-`",
         (_, "~") => "“not” is written `!`",
         (_, "'") => "a derivative is written `dx/dt`",
@@ -263,6 +265,18 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         _ => return None,
     };
     Some(advice.to_owned())
+}
+
+/// The hint for `%` between two numbers.
+fn hint_of_remainder(before: &str, behind: &str) -> String {
+    let is_word = |c: char| c.is_alphanumeric() || matches!(c, '_' | '.');
+    let x = &before[before.trim_end_matches(is_word).len()..];
+    let behind = behind.trim_start();
+    let y = &behind[..behind.find(|c| !is_word(c)).unwrap_or(behind.len())];
+    match x.is_empty() || y.is_empty() {
+        true => foreign_syntax::remainder("x", "y"),
+        false => foreign_syntax::remainder(x, y),
+    }
 }
 
 const DECIMAL: &str = "the decimal sign is a point: `0.5`";

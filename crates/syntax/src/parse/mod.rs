@@ -19,6 +19,7 @@ use pest::Parser;
 use crate::Errors;
 use crate::ast::{Document, Expression, HeadModule, Item, Part, modules_of};
 use crate::declarations::{Body, Named};
+use crate::foreign_lines::Stray;
 use crate::grammar::{Grammar, Pair, Rule};
 use crate::layout::{ItemKind, RawItem, layout, with_spaces};
 use crate::lexeme::in_name;
@@ -55,7 +56,7 @@ pub(super) struct Reader {
 impl Reader {
     /// The items of a text.
     pub fn read(&mut self, text: &str) -> Vec<(Item, Span)> {
-        let before = self.errors.len();
+        let (before, strays) = (self.errors.len(), self.document.strays.len());
         let cut = layout(text);
         self.errors.extend(cut.errors);
         if text.contains("#define") {
@@ -69,6 +70,17 @@ impl Reader {
             if in_item {
                 let span = Span::new(at, at + inside.len() + 3);
                 self.document.commented_widths.push((span, inside.trim().to_owned()));
+            }
+        }
+        for (at, stray) in foreign_lines::strays(text) {
+            let item = cut.items.iter().rfind(|item| item.start <= at);
+            let item = item.filter(|item| {
+                matches!(item.kind, ItemKind::Rule | ItemKind::Step) || item.kind.has_string()
+            });
+            let is_last = |item: &RawItem| cut.text[at + 1..item.end.max(at + 1)].trim().is_empty();
+            if item.is_some_and(|item| is_last(item) == (stray == Stray::End) || stray == Stray::Comment) {
+                let length = if stray == Stray::Comment { 2 } else { 1 };
+                self.document.strays.push((Span::new(at, at + length), stray));
             }
         }
         let functions = cut.items.iter().filter(|item| {
@@ -107,6 +119,7 @@ impl Reader {
             && let Some(error) = foreign_lines::comment(text)
         {
             self.errors.truncate(before);
+            self.document.strays.truncate(strays);
             self.errors.push(error);
         }
         items

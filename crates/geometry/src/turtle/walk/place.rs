@@ -109,11 +109,12 @@ impl Walk<'_> {
         if self.state.part.is_some() {
             return Err(self.error(ErrorKind::FreePlant));
         }
-        if age < 0.0 {
+        let scale = self.in_range(parameters.get(2).copied().unwrap_or(1.0))?;
+        if age < 0.0 || scale <= 0.0 {
             return Ok(());
         }
         let [heading, left, up] = self.seen_axes();
-        let placement = Placement::uniform(self.seen(self.state.position), [-left, heading, up], 1.0);
+        let placement = Placement::uniform(self.seen(self.state.position), [-left, heading, up], scale);
         let (seed, owner) = (parameters.get(1).copied(), self.owner());
         self.scene.seedlings.push(Seedling { plant, birth, age, seed, placement, owner });
         Ok(())
