@@ -2,6 +2,7 @@
 
 use crate::detect::crossing::needs_search;
 use crate::detect::pulse::{ExaminedStep, MAX_UNBOUNDED, PulseFinding};
+use crate::detect::quiet::Outlook;
 use crate::error::Error;
 use crate::flow::FlowStage;
 use crate::flow::coupled::Coupled;
@@ -313,6 +314,11 @@ impl FlowStage<'_, '_> {
         }
         self.show_coupled(from);
         let who = Owner::Module(id.slot() as u32);
+        if let (Some(solution), Some(state)) = (&self.world.coupled, self.world.state(id))
+            && (Outlook { world: self.world, solution, state, rule, from }).is_quiet()
+        {
+            return self.schedule.cancel(who);
+        }
         let mut start = from;
         loop {
             let (Some(solution), Some(state)) = (&self.world.coupled, self.world.state(id)) else { return };
