@@ -229,8 +229,8 @@ fn mix(a: f64, b: f64, s: f64) -> f64 {
 fn hull(values: &[f64]) -> Interval {
     let mut all = Interval::constant(values[0]);
     for &v in &values[1..] {
-        all.lo = all.lo.min(v);
-        all.hi = all.hi.max(v);
+        all.lo = if v < all.lo { v } else { all.lo };
+        all.hi = if v > all.hi { v } else { all.hi };
     }
     all
 }
