@@ -79,7 +79,7 @@ impl StepEquations<'_> {
         formulas_read.iter_mut().take(layout.own).for_each(|own| *own = true);
         let time = layout.variables - 2;
         let timed = [self.rates, &algebraic.values].iter().any(|program| program.reads().contains(&time));
-        Stepping::new(components, reads, formulas_read, [timed, read[1][time + 1]])
+        Stepping::new(components, reads, formulas_read, [timed, read.iter().any(|read| read[time + 1])])
     }
 
     /// By variable: true if steps read it, of the integrated equations or of all.
