@@ -48,7 +48,8 @@ impl Interval {
         Interval { partial: self.partial || partial, ..self }
     }
 
-    fn hull(self, other: Interval) -> Interval {
+    /// The smallest interval that contains both; it is partial if one of them is partial or empty.
+    pub fn hull(self, other: Interval) -> Interval {
         match (self.is_empty(), other.is_empty()) {
             (true, _) => other.flagged(true),
             (_, true) => self.flagged(true),

@@ -1,5 +1,9 @@
 //! Compilation of expressions to straight-line code with registers, and its evaluation for one row or many.
 
+mod lanes;
+
+pub use lanes::{LANES, Lanes};
+
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
@@ -20,6 +24,11 @@ enum Instruction {
     /// With a constant on the left, or on the right.
     Left(Binary, Register, f64, Register),
     Right(Binary, Register, Register, f64),
+    /// A sum or difference whose second operand is a product of registers, a square, or a multiple. Rounded twice, as two
+    /// instructions would.
+    Product(Binary, Register, Register, [Register; 2]),
+    Squared(Binary, Register, Register, Register),
+    Scaled(Binary, Register, Register, f64, Register),
     Select(Register, Register, Register, Register),
     /// The first number says which of the program's curves, or arrays.
     Curve(u32, Part, Register, Register),
@@ -36,6 +45,9 @@ impl Instruction {
             | Instruction::Binary(_, to, ..)
             | Instruction::Left(_, to, ..)
             | Instruction::Right(_, to, ..)
+            | Instruction::Product(_, to, ..)
+            | Instruction::Squared(_, to, ..)
+            | Instruction::Scaled(_, to, ..)
             | Instruction::Select(to, ..)
             | Instruction::Curve(_, _, to, _)
             | Instruction::Piece(_, _, to, ..)
@@ -52,50 +64,30 @@ impl Instruction {
             | Instruction::Right(_, _, a, _)
             | Instruction::Curve(.., a)
             | Instruction::Element(.., a) => [Some(a), None, None, None],
-            Instruction::Binary(_, _, a, b) | Instruction::Piece(.., a, b) => [Some(a), Some(b), None, None],
+            Instruction::Binary(_, _, a, b)
+            | Instruction::Squared(_, _, a, b)
+            | Instruction::Scaled(_, _, a, _, b)
+            | Instruction::Piece(.., a, b) => [Some(a), Some(b), None, None],
+            Instruction::Product(_, _, a, [b, c]) => [Some(a), Some(b), Some(c), None],
             Instruction::Select(_, c, a, b) => [Some(c), Some(a), Some(b), None],
             Instruction::Field(.., at) => at.map(Some),
         }
     }
 }
 
-/// Rows that are evaluated at once by [`Program::eval_lanes`].
-pub const LANES: usize = 32;
-
-/// One value of each row.
-pub type Lanes = [f64; LANES];
-
-/// Lanes that fit into the processor's registers together, so that the result may overwrite an operand without a copy.
-const PART: usize = 8;
-
-/// Applies an operation to the first `PARTS` parts of the lanes.
-#[inline(always)]
-fn each<const PARTS: usize>(registers: &mut [Lanes], [to, a, b]: [Register; 3], f: impl Fn(f64, f64) -> f64) {
-    let [to, a, b] = [to, a, b].map(|register| register as usize);
-    // Looked at once, not for every part.
-    assert!(to < registers.len() && a < registers.len() && b < registers.len());
-    for i in 0..PARTS {
-        let [mut x, y] = [a, b].map(|register| registers[register].as_chunks::<PART>().0[i]);
-        for (x, y) in x.iter_mut().zip(y) {
-            *x = f(*x, y);
-        }
-        registers[to].as_chunks_mut::<PART>().0[i] = x;
+/// A sum or difference right after the product that is its second operand, as one instruction; `None` if these are not. The
+/// product is not kept.
+fn joined(product: Instruction, sum: Instruction) -> Option<Instruction> {
+    let Instruction::Binary(op @ (Binary::Add | Binary::Sub), to, a, b) = sum else { return None };
+    let made = product.destination();
+    if b != made || a == made {
+        return None;
     }
-}
-
-/// The same for operations that take so long that all else counts little.
-#[inline(never)]
-#[expect(clippy::needless_range_loop, reason = "the rows of three registers, two of which may be one")]
-fn each_of(
-    registers: &mut [Lanes],
-    rows: usize,
-    [to, a, b]: [Register; 3],
-    f: &mut dyn FnMut(f64, f64) -> f64,
-) {
-    let [to, a, b] = [to, a, b].map(|register| register as usize);
-    for row in 0..rows {
-        let value = f(registers[a][row], registers[b][row]);
-        registers[to][row] = value;
+    match product {
+        Instruction::Unary(Unary::Square, _, x) => Some(Instruction::Squared(op, to, a, x)),
+        Instruction::Binary(Binary::Mul, _, x, y) => Some(Instruction::Product(op, to, a, [x, y])),
+        Instruction::Left(Binary::Mul, _, x, y) => Some(Instruction::Scaled(op, to, a, x, y)),
+        _ => None,
     }
 }
 
@@ -191,6 +183,11 @@ struct Compiler<'g> {
 }
 
 impl Compiler<'_> {
+    /// True if nothing uses an operand after the expression that has just been compiled.
+    fn is_last_use(&self, operand: Option<NodeId>) -> bool {
+        operand.is_some_and(|operand| self.uses.get(&operand) == Some(&0))
+    }
+
     /// The instruction for an expression whose operands have been compiled.
     fn instruction(&mut self, id: NodeId) -> Instruction {
         let graph = self.graph;
@@ -255,7 +252,7 @@ impl Program {
             arrays: Table::default(),
             fields: Table::default(),
         };
-        let mut code = Vec::new();
+        let mut code: Vec<Instruction> = Vec::new();
         for id in order {
             match graph.node(id) {
                 Node::Var(v) => {
@@ -264,7 +261,14 @@ impl Program {
                 }
                 // A constant that stands in the instructions of its users.
                 Node::Const(_) if !compiler.uses.contains_key(&id) => {}
-                _ => code.push(compiler.instruction(id)),
+                node => {
+                    let instruction = compiler.instruction(id);
+                    let last = code.last().copied().filter(|_| compiler.is_last_use(node.operands()[1]));
+                    match last.and_then(|last| joined(last, instruction)) {
+                        Some(both) => *code.last_mut().expect("seen above") = both,
+                        None => code.push(instruction),
+                    }
+                }
             }
         }
         let constants = roots.iter().map(|root| graph.as_constant(*root)).collect();
@@ -362,6 +366,17 @@ impl Program {
                 }
                 Instruction::Left(op, to, x, b) => (to, T::binary(op, T::constant(x), scratch[b as usize])),
                 Instruction::Right(op, to, a, x) => (to, T::binary(op, scratch[a as usize], T::constant(x))),
+                Instruction::Product(op, to, a, [b, c]) => {
+                    let product = T::binary(Binary::Mul, scratch[b as usize], scratch[c as usize]);
+                    (to, T::binary(op, scratch[a as usize], product))
+                }
+                Instruction::Squared(op, to, a, b) => {
+                    (to, T::binary(op, scratch[a as usize], T::unary(Unary::Square, scratch[b as usize])))
+                }
+                Instruction::Scaled(op, to, a, x, b) => {
+                    let product = T::binary(Binary::Mul, T::constant(x), scratch[b as usize]);
+                    (to, T::binary(op, scratch[a as usize], product))
+                }
                 Instruction::Select(to, c, a, b) => {
                     (to, T::select(scratch[c as usize], scratch[a as usize], scratch[b as usize]))
                 }
@@ -383,121 +398,6 @@ impl Program {
         }
         for (value, &register) in out.iter_mut().zip(&self.outputs) {
             *value = scratch[register as usize];
-        }
-    }
-
-    /// Evaluates all roots for many rows at once: register v of `registers` holds variable v of every row. Every
-    /// operation runs over all rows before the next, and gives each the same bits as [`Program::eval`]. Returns the
-    /// register of each output.
-    pub fn eval_lanes(&self, registers: &mut Vec<Lanes>) -> impl ExactSizeIterator<Item = usize> + '_ {
-        self.eval_rows(registers, LANES)
-    }
-
-    /// The same for the first `rows` only; the other lanes have no meaning afterwards.
-    pub fn eval_rows(
-        &self,
-        registers: &mut Vec<Lanes>,
-        rows: usize,
-    ) -> impl ExactSizeIterator<Item = usize> + '_ {
-        if registers.len() < self.registers {
-            registers.resize(self.registers, [0.0; LANES]);
-        }
-        // Loops of a length that is known when this is compiled take two thirds of the instructions.
-        match rows.div_ceil(PART) {
-            0 | 1 => self.run::<1>(registers, rows),
-            2 => self.run::<2>(registers, rows),
-            _ => self.run::<{ LANES / PART }>(registers, rows),
-        }
-        self.outputs.iter().map(|&register| register as usize)
-    }
-
-    /// Carries out all instructions for so many parts of the lanes, of which `rows` lanes count.
-    fn run<const PARTS: usize>(&self, registers: &mut [Lanes], rows: usize) {
-        for instruction in &self.code {
-            match *instruction {
-                Instruction::Const(to, x) => each::<PARTS>(registers, [to, to, to], |_, _| x),
-                Instruction::Unary(Unary::Neg, to, a) => each::<PARTS>(registers, [to, a, a], |x, _| -x),
-                Instruction::Unary(Unary::Square, to, a) => {
-                    each::<PARTS>(registers, [to, a, a], |x, _| x * x)
-                }
-                Instruction::Binary(Binary::Add, to, a, b) => {
-                    each::<PARTS>(registers, [to, a, b], |x, y| x + y)
-                }
-                Instruction::Binary(Binary::Sub, to, a, b) => {
-                    each::<PARTS>(registers, [to, a, b], |x, y| x - y)
-                }
-                Instruction::Binary(Binary::Mul, to, a, b) => {
-                    each::<PARTS>(registers, [to, a, b], |x, y| x * y)
-                }
-                Instruction::Binary(Binary::Div, to, a, b) => {
-                    each::<PARTS>(registers, [to, a, b], |x, y| x / y)
-                }
-                Instruction::Left(Binary::Add, to, x, b) => {
-                    each::<PARTS>(registers, [to, b, b], |y, _| x + y)
-                }
-                Instruction::Left(Binary::Sub, to, x, b) => {
-                    each::<PARTS>(registers, [to, b, b], |y, _| x - y)
-                }
-                Instruction::Left(Binary::Mul, to, x, b) => {
-                    each::<PARTS>(registers, [to, b, b], |y, _| x * y)
-                }
-                Instruction::Left(Binary::Div, to, x, b) => {
-                    each::<PARTS>(registers, [to, b, b], |y, _| x / y)
-                }
-                Instruction::Right(Binary::Add, to, a, y) => {
-                    each::<PARTS>(registers, [to, a, a], |x, _| x + y)
-                }
-                Instruction::Right(Binary::Sub, to, a, y) => {
-                    each::<PARTS>(registers, [to, a, a], |x, _| x - y)
-                }
-                Instruction::Right(Binary::Mul, to, a, y) => {
-                    each::<PARTS>(registers, [to, a, a], |x, _| x * y)
-                }
-                Instruction::Right(Binary::Div, to, a, y) => {
-                    each::<PARTS>(registers, [to, a, a], |x, _| x / y)
-                }
-                _ => self.carry_out(*instruction, registers, rows),
-            }
-        }
-    }
-
-    /// Carries out an instruction that is more than arithmetic, row by row.
-    fn carry_out(&self, instruction: Instruction, registers: &mut [Lanes], rows: usize) {
-        match instruction {
-            Instruction::Const(to, x) => each_of(registers, rows, [to, to, to], &mut |_, _| x),
-            Instruction::Unary(op, to, a) => {
-                each_of(registers, rows, [to, a, a], &mut |x, _| f64::unary(op, x))
-            }
-            Instruction::Binary(op, to, a, b) => {
-                each_of(registers, rows, [to, a, b], &mut |x, y| f64::binary(op, x, y));
-            }
-            Instruction::Left(op, to, x, b) => {
-                each_of(registers, rows, [to, b, b], &mut |y, _| f64::binary(op, x, y));
-            }
-            Instruction::Right(op, to, a, y) => {
-                each_of(registers, rows, [to, a, a], &mut |x, _| f64::binary(op, x, y));
-            }
-            Instruction::Select(to, c, a, b) => {
-                let (c, a, b) = (registers[c as usize], registers[a as usize], registers[b as usize]);
-                registers[to as usize] = std::array::from_fn(|i| f64::select(c[i], a[i], b[i]));
-            }
-            Instruction::Curve(curve, part, to, a) => {
-                let curve = &self.curves[curve as usize];
-                each_of(registers, rows, [to, a, a], &mut |x, _| curve.eval(part, x));
-            }
-            Instruction::Piece(curve, part, to, i, a) => {
-                let curve = &self.curves[curve as usize];
-                each_of(registers, rows, [to, i, a], &mut |i, x| curve.continued(part, i, x));
-            }
-            Instruction::Element(array, to, i) => {
-                let array = &self.arrays[array as usize];
-                each_of(registers, rows, [to, i, i], &mut |i, _| array.element(i));
-            }
-            Instruction::Field(field, part, to, at) => {
-                let (field, at) = (&self.fields[field as usize], at.map(|of| registers[of as usize]));
-                let value = |i: usize| field.value(part, [at[0][i], at[1][i], at[2][i], at[3][i]]);
-                registers[to as usize] = std::array::from_fn(|i| if i < rows { value(i) } else { f64::NAN });
-            }
         }
     }
 

@@ -19,6 +19,14 @@ fn all() -> (Graph, Vec<(String, NodeId)>) {
     for op in [Binary::Add, Binary::Sub, Binary::Mul, Binary::Div, Binary::Pow] {
         list.push((format!("{op:?}"), g.binary(op, x, y)));
     }
+    let (three, product, square) =
+        (g.constant(3.0), g.binary(Binary::Mul, x, y), g.binary(Binary::Mul, y, y));
+    let multiple = g.binary(Binary::Mul, three, y);
+    for op in [Binary::Add, Binary::Sub] {
+        for (second, of) in [(product, "xy"), (square, "y y"), (multiple, "3y")] {
+            list.push((format!("{op:?}(x, {of})"), g.binary(op, x, second)));
+        }
+    }
     for exponent in [-2.0, -1.0, 0.0, 2.0, 3.0, 0.5, 1.5] {
         let e = g.constant(exponent);
         list.push((format!("x^{exponent}"), g.binary(Binary::Pow, x, e)));
@@ -62,6 +70,32 @@ fn eval<T: Value>(graph: &Graph, node: NodeId, variables: &[T]) -> T {
     let mut out = [T::constant(0.0)];
     Program::compile(graph, &[node], 2).eval(variables, &mut Vec::new(), &mut out);
     out[0]
+}
+
+/// A sum and the product in it are one instruction, and are rounded twice all the same. A product that is used again stays.
+#[test]
+fn sums_of_products_are_rounded_twice() {
+    let mut g = Graph::default();
+    let (x, y, three) = (g.var(0), g.var(1), g.constant(3.0));
+    let (product, square) = (g.binary(Binary::Mul, x, y), g.binary(Binary::Mul, x, x));
+    let (multiple, more) = (g.binary(Binary::Mul, three, x), g.binary(Binary::Add, y, product));
+    let rest = g.binary(Binary::Sub, more, multiple);
+    let less = g.binary(Binary::Sub, rest, square);
+    let again = g.binary(Binary::Sub, less, product);
+    let (a, b) = (1.0 / 3.0, 0.3f64);
+    let (p, q, r) = (a * b, a * a, 3.0 * a);
+    let (more, low) = (b + p, b + p - r);
+    let expected = low - q - p;
+    assert_ne!(expected, f64::mul_add(-a, a, low) - p, "the second rounding shows");
+    let program = Program::compile(&g, &[again], 2);
+    assert_eq!(program.eval_one(&[a, b]).to_bits(), expected.to_bits());
+    let mut registers = vec![[a; LANES], [b; LANES]];
+    let output = program.eval_lanes(&mut registers).next().expect("one root");
+    assert_eq!(registers[output].map(f64::to_bits), [expected.to_bits(); LANES]);
+    let sums = Program::compile(&g, &[rest, product], 2);
+    let mut out = [0.0; 2];
+    sums.eval(&[a, b], &mut Vec::new(), &mut out);
+    assert_eq!(out, [more - r, p]);
 }
 
 #[test]

@@ -15,6 +15,7 @@ impl SimTime {
     pub const ZERO: SimTime = SimTime { high: 0.0, low: 0.0 };
 
     /// The time `t`, in units of simulated time.
+    #[inline]
     pub fn new(t: f64) -> SimTime {
         SimTime { high: t, low: 0.0 }
     }
@@ -26,6 +27,7 @@ impl SimTime {
     }
 
     /// The instant after a duration.
+    #[inline]
     pub fn after(self, duration: f64) -> SimTime {
         let (high, error) = two_sum(self.high, duration);
         let (high, low) = two_sum(high, self.low + error);
@@ -40,18 +42,21 @@ impl SimTime {
     }
 
     /// The duration since an earlier instant.
+    #[inline]
     pub fn since(self, earlier: SimTime) -> f64 {
         let (difference, error) = two_sum(self.high, -earlier.high);
         difference + (error + (self.low - earlier.low))
     }
 
     /// The nearest float.
+    #[inline]
     pub fn to_f64(self) -> f64 {
         self.high
     }
 
     /// Events closer together than this are one instant (LANGUAGE, "Events"): a few units in the last
     /// place of `t`.
+    #[inline]
     pub fn resolution(self) -> f64 {
         8.0 * f64::EPSILON * self.high.abs().max(f64::MIN_POSITIVE)
     }

@@ -6,8 +6,8 @@ pub struct Stepping {
     /// The parameters that are integrated, then those that are solved for, in the order of their components: first for the
     /// case that formulas are used, then for the case that all equations are integrated.
     components: [Vec<usize>; 2],
-    /// The parameters of the module and of its context that a step may read.
-    reads: Vec<Read>,
+    /// The parameters of the module and of its context that a step may read, for the same two cases.
+    reads: [Vec<Read>; 2],
     /// By variable of the rule: true if a formula reads it when the clause becomes active.
     formulas_read: Vec<bool>,
     /// True if rates, or values that are solved for, read `t`.
@@ -28,11 +28,11 @@ pub struct Read {
 }
 
 impl Stepping {
-    /// The results of an analysis: the components with formulas and without, the parameters that a step reads, by variable
+    /// The results of an analysis: the components with formulas and without, the parameters that a step then reads, by variable
     /// whether formulas read it, and whether rates or values that are solved for read `t`, and steps `age`.
     pub fn new(
         components: [Vec<usize>; 2],
-        reads: Vec<Read>,
+        reads: [Vec<Read>; 2],
         formulas_read: Vec<bool>,
         [timed, aged]: [bool; 2],
     ) -> Stepping {
@@ -46,8 +46,8 @@ impl Stepping {
     }
 
     /// The parameters of the module and of its context that a step may read.
-    pub fn reads(&self) -> &[Read] {
-        &self.reads
+    pub fn reads(&self, numeric_only: bool) -> &[Read] {
+        &self.reads[usize::from(numeric_only)]
     }
 
     /// True if rates, or values that are solved for, read the time of the simulation.

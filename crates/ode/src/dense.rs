@@ -71,10 +71,12 @@ impl Dense {
     }
 
     /// Position of an instant in the step: 0 at its start, 1 at its end.
+    #[inline]
     pub fn position(&self, at: SimTime) -> f64 {
         if self.h == 0.0 { 0.0 } else { (at.since(self.start) / self.h).clamp(0.0, 1.0) }
     }
 
+    #[inline]
     fn of(&self, component: usize) -> &[f64] {
         &self.coefficients[component * (self.degree + 1)..(component + 1) * (self.degree + 1)]
     }
@@ -156,6 +158,7 @@ impl Dense {
     }
 
     /// Bounds of one component over the whole step: the hull of its coefficients.
+    #[inline]
     pub fn bounds(&self, component: usize) -> Interval {
         hull(self.of(component))
     }
@@ -229,8 +232,8 @@ fn mix(a: f64, b: f64, s: f64) -> f64 {
 fn hull(values: &[f64]) -> Interval {
     let mut all = Interval::constant(values[0]);
     for &v in &values[1..] {
-        all.lo = all.lo.min(v);
-        all.hi = all.hi.max(v);
+        all.lo = if v < all.lo { v } else { all.lo };
+        all.hi = if v > all.hi { v } else { all.hi };
     }
     all
 }

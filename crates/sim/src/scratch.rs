@@ -10,3 +10,14 @@ pub struct Scratch {
     pub registers: Registers<f64>,
     pub rates: Vec<f64>,
 }
+
+/// Lists that were longer are not kept for the next instant.
+pub const LONG: usize = 1 << 18;
+
+/// Empties a list, and gives back its memory if that is much.
+pub fn clear<T>(list: &mut Vec<T>) {
+    list.clear();
+    if list.capacity() > LONG {
+        *list = Vec::new();
+    }
+}

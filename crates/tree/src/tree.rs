@@ -30,6 +30,7 @@ pub struct ModuleId {
 
 impl ModuleId {
     /// Small number, unique among living modules.
+    #[inline]
     pub fn slot(self) -> usize {
         self.slot as usize
     }
@@ -163,6 +164,7 @@ impl Tree {
     }
 
     /// True if the module has not been replaced.
+    #[inline]
     pub fn is_alive(&self, id: ModuleId) -> bool {
         self.nodes[id.slot()].generation == id.generation
     }
@@ -174,6 +176,7 @@ impl Tree {
     }
 
     /// The module in a slot.
+    #[inline]
     pub fn id(&self, slot: u32) -> ModuleId {
         ModuleId { slot, generation: self.nodes[slot as usize].generation }
     }
@@ -193,11 +196,13 @@ impl Tree {
     }
 
     /// The kind of a living module.
+    #[inline]
     pub fn kind(&self, id: ModuleId) -> KindId {
         self.node(id).kind
     }
 
     /// The time at which a production made a living module.
+    #[inline]
     pub fn birth(&self, id: ModuleId) -> SimTime {
         self.groups.birth(self.node(id).group)
     }
@@ -209,6 +214,7 @@ impl Tree {
     }
 
     /// A number that the owner of the tree has given to a module; [`NO_LABEL`] from birth on.
+    #[inline]
     pub fn label(&self, id: ModuleId) -> u16 {
         self.node(id).label
     }
@@ -219,17 +225,20 @@ impl Tree {
     }
 
     /// The label of a module; None if it has been replaced.
+    #[inline]
     pub fn label_if_alive(&self, id: ModuleId) -> Option<u16> {
         let node = &self.nodes[id.slot()];
         (node.generation == id.generation).then_some(node.label)
     }
 
     /// Places of a module's parameters in [`Tree::values`].
+    #[inline]
     pub fn places(&self, id: ModuleId) -> std::ops::Range<usize> {
         self.node(id).places(&self.arities)
     }
 
     /// All parameters of a living module, hidden ones last.
+    #[inline]
     pub fn parameters(&self, id: ModuleId) -> &[f64] {
         &self.values[self.places(id)]
     }
@@ -240,11 +249,13 @@ impl Tree {
     }
 
     /// All parameters of all modules; a module's stand at [`Tree::places`].
+    #[inline]
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
     /// Sets the parameter at a place of [`Tree::values`].
+    #[inline]
     pub fn set_value(&mut self, place: usize, value: f64) {
         self.values[place] = value;
     }

@@ -96,7 +96,8 @@ fn time_between(from: f64, to: f64) -> f64 {
 pub fn growing() -> Outcome {
     for growing in Growing::ALL {
         let mut costs = Vec::new();
-        let text = growing.text(100, 7);
+        // With seed 7 a cell of Anabaena comes too near the threshold at t = 550 for the tolerance to tell whether it meets it.
+        let text = growing.text(100, 1);
         let session = solver::session(&text)?;
         let mut simulation = session.simulate(Settings::default()).map_err(|e| e.to_string())?;
         let mut t = 0.0;

@@ -49,25 +49,15 @@ impl StepEquations<'_> {
             let solved = (0..algebraic.of.len()).filter(|place| algebraic.is_solved(*place, numeric_only));
             numeric.map(|i| self.of[i]).chain(solved.map(|place| algebraic.of[place])).collect()
         });
-        let linear = self.linear;
-        let programs = [self.rates, self.numeric_rates, &self.jacobian.values];
-        let mut read = read_by(programs.into_iter().chain(linear.map(|l| &l.coefficients)), layout.variables);
-        let entries = self.jacobian.entries.iter().map(|(_, variable)| *variable);
-        for variable in linear.into_iter().flat_map(|l| l.variables.iter().flatten().copied()).chain(entries)
-        {
-            read[variable] = true;
-        }
-        // Implicit equations and aggregates read variables that are not listed in these programs.
-        if !algebraic.is_empty() || layout.aggregates {
-            read.fill(true);
-        }
         let widths = layout.context.iter().copied().enumerate();
         let own = (0..layout.own).map(|parameter| (None, parameter));
         let context = widths.flat_map(|(n, width)| (0..width).map(move |parameter| (Some(n), parameter)));
-        let reads = (own.chain(context).enumerate())
+        let all: Vec<Read> = (own.chain(context).enumerate())
             .map(|(variable, (neighbour, parameter))| Read { variable, neighbour, parameter })
-            .filter(|one| read[one.variable])
             .collect();
+        let read = [false, true].map(|numeric_only| self.read_by_steps(numeric_only, layout));
+        let reads =
+            [0, 1].map(|case: usize| all.iter().copied().filter(|one| read[case][one.variable]).collect());
         let mut formulas = Vec::new();
         let mut few = !layout.aggregates && algebraic.is_empty();
         for form in self.solution_forms {
@@ -89,7 +79,31 @@ impl StepEquations<'_> {
         formulas_read.iter_mut().take(layout.own).for_each(|own| *own = true);
         let time = layout.variables - 2;
         let timed = [self.rates, &algebraic.values].iter().any(|program| program.reads().contains(&time));
-        Stepping::new(components, reads, formulas_read, [timed, read[time + 1]])
+        Stepping::new(components, reads, formulas_read, [timed, read.iter().any(|read| read[time + 1])])
+    }
+
+    /// By variable: true if steps read it, of the integrated equations or of all.
+    fn read_by_steps(&self, numeric_only: bool, layout: &VariableLayout) -> Vec<bool> {
+        // Implicit equations and aggregates read variables that are not listed in these programs.
+        if !self.algebraic.is_empty() || layout.aggregates {
+            return vec![true; layout.variables];
+        }
+        let (linear, derivatives) = (self.linear, &self.jacobian.values);
+        let rates = if numeric_only { self.rates } else { self.numeric_rates };
+        let mut read = read_by([rates].into_iter().chain(linear.map(|l| &l.coefficients)), layout.variables);
+        let of_linear = linear.into_iter().flat_map(|l| l.variables.iter().flatten().copied());
+        let of_derivatives = (self.jacobian.entries.iter().enumerate())
+            .filter(|(_, (rate, _))| numeric_only || self.numeric.contains(rate))
+            .flat_map(|(entry, (_, variable))| {
+                derivatives.output_reads(entry).into_iter().chain([*variable])
+            });
+        for variable in of_linear.chain(of_derivatives) {
+            // Switches come behind the variables.
+            if let Some(read) = read.get_mut(variable) {
+                *read = true;
+            }
+        }
+        read
     }
 }
 

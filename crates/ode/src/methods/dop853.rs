@@ -7,7 +7,7 @@ use super::explicit::{Pair, Tableau};
 use crate::Rates;
 use crate::dense::{Dense, PLACE};
 use crate::one_step::InteriorError;
-use crate::workspace::{FLOOR, Workspace, part};
+use crate::workspace::{FLOOR, PART, Workspace, part};
 
 /// The method: 12 stages and the rate at the end, three more for the dense output.
 #[derive(Clone, Debug)]
@@ -21,10 +21,11 @@ impl Pair for Dop853 {
     const INTERIOR_IS_MEASURED: bool = true;
 
     fn dense(y: &[f64], end: &[f64], k: &[Vec<f64>], first: usize, h: f64, out: &mut Vec<f64>) {
-        let k: [_; 16] = std::array::from_fn(|stage| part(&k[stage], first));
-        for (j, (a, b)) in y.iter().zip(end).enumerate() {
-            out.extend(dop853_dense(*a, *b, &k.map(|k| h * k[j])));
-        }
+        let (mut from, mut to) = ([0.0; PART], [0.0; PART]);
+        from[..y.len()].copy_from_slice(y);
+        to[..y.len()].copy_from_slice(end);
+        let hk = std::array::from_fn(|stage| part(&k[stage], first).map(|k| h * k));
+        out.extend_from_slice(dop853_dense(&from, &to, &hk)[..y.len()].as_flattened());
     }
 
     /// The dense output may err a thousand times more than the end of the step where the step is twice as long as stability allows,
@@ -176,16 +177,22 @@ pub(super) fn join_estimates(e5: f64, e3: f64) -> f64 {
     if ratio > 1e100 { e5.abs() / ratio } else { e5.abs() / (1.0 + ratio * ratio).sqrt() }
 }
 
-/// Dense output weights applied to the stage rates of one component.
+/// Dense output weights applied to the stage rates of some components, side by side.
 ///
 /// The weights sum to zero, so the first rate is taken off before: what is summed is then of the size of the
 /// variation in the step, and a constant rate gives exactly zero in spite of weights of several hundred.
-fn dense_sum(d: &[f64], hk: &[f64]) -> f64 {
-    let first = hk.first().copied().unwrap_or(0.0);
-    d.iter().zip(hk).map(|(d, k)| d * (k - first)).sum()
+#[inline(always)]
+fn dense_sum<const N: usize>(d: &[f64], hk: &[[f64; N]; 16]) -> [f64; N] {
+    let mut sums = [-0.0; N];
+    for (d, k) in d.iter().zip(hk) {
+        for j in 0..N {
+            sums[j] += d * (k[j] - hk[0][j]);
+        }
+    }
+    sums
 }
 
-/// Dense output of one component of a [`DOP853`] step: Bernstein coefficients of degree 7 on [0, 1].
+/// Dense output of some components of a [`DOP853`] step: Bernstein coefficients of degree 7 on [0, 1].
 ///
 /// `y0` and `y1` are the values at the ends of the step and `hk` is `h` times the 16 stage rates, the 13th
 /// (index 12) at the end of the step. The polynomial is that of the code DOP853 (Hairer, Norsett, Wanner,
@@ -193,20 +200,28 @@ fn dense_sum(d: &[f64], hk: &[f64]) -> f64 {
 /// `s^2(1-s)^2 (r5 + s (r6 + (1-s) (r7 + s r8)))`, where `r5..r8` are the sums `sum_i d_i hk_i`.
 /// The ends are exact: `b_0 = y0`, `b_7 = y1`; the slopes there are `hk1` and `hk13`.
 /// Its error in a step falls like `h^8`.
-pub(super) fn dop853_dense(y0: f64, y1: f64, hk: &[f64; 16]) -> [f64; 8] {
-    let (first, end) = (hk[0], hk[12]);
-    let dy = y1 - y0;
-    let [r5, r6, r7, r8] = [0, 1, 2, 3].map(|i| dense_sum(DOP853.d[i], hk));
-    // The Hermite cubic raised to degree 7, plus s^i (1-s)^j raised to the same degree. Every coefficient is
-    // built from the nearer end, so that small changes are added to the large value once.
-    [
-        y0,
-        y0 + first / 7.0,
-        y0 + (dy / 7.0 + (4.0 * first - end + r5) / 21.0),
-        y0 + (13.0 / 35.0 * dy + (6.0 * first - 4.0 * end + 3.0 * r5 + r6 + r7) / 35.0),
-        y1 - (13.0 / 35.0 * dy + (6.0 * end - 4.0 * first - 3.0 * r5 - 2.0 * r6 - r7 - r8) / 35.0),
-        y1 - (dy / 7.0 + (4.0 * end - first - r5 - r6) / 21.0),
-        y1 - end / 7.0,
-        y1,
-    ]
+#[inline]
+pub(super) fn dop853_dense<const N: usize>(
+    y0: &[f64; N],
+    y1: &[f64; N],
+    hk: &[[f64; N]; 16],
+) -> [[f64; 8]; N] {
+    let sums = [0, 1, 2, 3].map(|i: usize| dense_sum(DOP853.d[i], hk));
+    std::array::from_fn(|j| {
+        let (y0, y1, first, end) = (y0[j], y1[j], hk[0][j], hk[12][j]);
+        let dy = y1 - y0;
+        let [r5, r6, r7, r8] = sums.map(|sum| sum[j]);
+        // The Hermite cubic raised to degree 7, plus s^i (1-s)^j raised to the same degree. Every coefficient is
+        // built from the nearer end, so that small changes are added to the large value once.
+        [
+            y0,
+            y0 + first / 7.0,
+            y0 + (dy / 7.0 + (4.0 * first - end + r5) / 21.0),
+            y0 + (13.0 / 35.0 * dy + (6.0 * first - 4.0 * end + 3.0 * r5 + r6 + r7) / 35.0),
+            y1 - (13.0 / 35.0 * dy + (6.0 * end - 4.0 * first - 3.0 * r5 - 2.0 * r6 - r7 - r8) / 35.0),
+            y1 - (dy / 7.0 + (4.0 * end - first - r5 - r6) / 21.0),
+            y1 - end / 7.0,
+            y1,
+        ]
+    })
 }

@@ -13,7 +13,6 @@ use crate::dense::Dense;
 use crate::one_step::{InteriorError, Nodes, OneStep, Step, Trial};
 use crate::workspace::{FLOOR, MAX_STAGES, PART, Workspace, part};
 use dlsys_expr::SimTime;
-use smallvec::SmallVec;
 use std::marker::PhantomData;
 
 /// An explicit Runge-Kutta pair with dense output, for `y' = f(t, y)` and steps of length `h`.
@@ -104,13 +103,12 @@ impl<P: Pair> OneStep for Explicit<P> {
         step: Step<'_>,
         tolerance: f64,
     ) -> Trial {
-        work.attempt_pair(P::TABLEAU, system, step, tolerance)
+        work.attempt_pair::<P>(system, step, tolerance)
     }
 
     fn absolute_error(&self, work: &Workspace, step: Step<'_>, _error: f64, _tolerance: f64) -> f64 {
-        let part = |(component, y): (usize, &f64)| {
-            work.estimate(P::TABLEAU, step.h, component).abs() / y.abs().max(1.0)
-        };
+        let part =
+            |(component, y): (usize, &f64)| work.estimate::<P>(step.h, component).abs() / y.abs().max(1.0);
         step.y.iter().enumerate().map(part).fold(0.0, f64::max)
     }
 
@@ -128,7 +126,7 @@ impl<P: Pair> OneStep for Explicit<P> {
         let (Step { y, start, h }, tableau) = (step, P::TABLEAU);
         work.from[..y.len()].copy_from_slice(y);
         for i in tableau.stages..tableau.a.len() {
-            work.combine(tableau.a[i], y.len(), h);
+            work.combine_for::<P>(i, y.len(), h);
             work.evaluate(system, tableau.c[i] * h, i);
         }
         let mut c = Vec::with_capacity(y.len() * (P::DEGREE + 1));
@@ -157,38 +155,59 @@ impl<P: Pair> OneStep for Explicit<P> {
 /// So few components are summed one by one, in the same order as many.
 const FEW: usize = 2;
 
-/// So many parts are summed without a list of the stages that count, which takes about as long to make.
-const SHORT: usize = 8;
+/// The weights of a sum over stages. They are known when this is compiled, so that zeros cost nothing and no loop is left.
+trait Weights {
+    const WEIGHTS: &'static [f64];
+}
 
-/// A stage that counts in a sum: its weight, and its rates in parts.
-type Term<'k> = (f64, &'k [[f64; PART]]);
+/// The weights of the state at which stage `I` is evaluated.
+struct StageOf<P, const I: usize>(PhantomData<P>);
 
-/// All stages that count in a sum.
-type Listed<'k> = SmallVec<[Term<'k>; MAX_STAGES]>;
+/// The weights of error estimate `I`.
+struct EstimateOf<P, const I: usize>(PhantomData<P>);
 
-/// The stages that count in a sum with these weights.
+impl<P: Pair, const I: usize> Weights for StageOf<P, I> {
+    const WEIGHTS: &'static [f64] = row(P::TABLEAU.a, I);
+}
+
+impl<P: Pair, const I: usize> Weights for EstimateOf<P, I> {
+    const WEIGHTS: &'static [f64] = row(P::TABLEAU.e, I);
+}
+
+/// A row of a table; empty beyond its end.
+const fn row(table: &'static [&'static [f64]], i: usize) -> &'static [f64] {
+    if i < table.len() { table[i] } else { &[] }
+}
+
+/// The rates at all stages, in parts.
+type Parts<'k> = [&'k [[f64; PART]]; MAX_STAGES];
+
+/// The first `blocks` parts of the rates at the stages that count in a sum.
 #[inline(always)]
-fn terms<'k>(weights: &[f64], k: &'k [Vec<f64>]) -> impl Iterator<Item = Term<'k>> {
-    let counts = |(weight, _): &(&f64, &Vec<f64>)| **weight != 0.0;
-    weights.iter().zip(k).filter(counts).map(|(weight, k)| (*weight, k.as_chunks().0))
+fn parts<W: Weights>(k: &[Vec<f64>], blocks: usize) -> Parts<'_> {
+    let counts = |stage: usize| stage < W::WEIGHTS.len() && W::WEIGHTS[stage] != 0.0;
+    std::array::from_fn(|stage| if counts(stage) { &k[stage].as_chunks().0[..blocks] } else { &[][..] })
 }
 
 /// The sums of the stages' rates, of the components of a part.
 #[inline(always)]
-fn weigh<'k>(terms: impl Iterator<Item = Term<'k>>, block: usize) -> [f64; PART] {
+fn weigh<W: Weights>(k: &Parts<'_>, block: usize) -> [f64; PART] {
     let mut sums = [0.0; PART];
-    for (weight, k) in terms {
-        for (sum, k) in sums.iter_mut().zip(&k[block]) {
-            *sum += weight * k;
+    for (weight, k) in W::WEIGHTS.iter().zip(k) {
+        if *weight != 0.0 {
+            for (sum, k) in sums.iter_mut().zip(&k[block]) {
+                *sum += weight * k;
+            }
         }
     }
     sums
 }
 
 /// The sum of one component's rates at the stages with these weights.
-fn weighed(weights: &[f64], k: &[Vec<f64>], component: usize) -> f64 {
+#[inline(always)]
+fn weighed<W: Weights>(k: &[Vec<f64>], component: usize) -> f64 {
     let mut sum = 0.0;
-    for (weight, k) in weights.iter().zip(k) {
+    for (weight, k) in W::WEIGHTS.iter().zip(k) {
         if *weight != 0.0 {
             sum += weight * k[component];
         }
@@ -198,17 +217,11 @@ fn weighed(weights: &[f64], k: &[Vec<f64>], component: usize) -> f64 {
 
 impl Workspace {
     /// Tries a step of a pair from a state whose rates are known.
-    fn attempt_pair(
-        &mut self,
-        tableau: &Tableau,
-        system: &mut impl Rates,
-        step: Step<'_>,
-        tolerance: f64,
-    ) -> Trial {
-        let (Step { y, h, .. }, n) = (step, step.y.len());
+    fn attempt_pair<P: Pair>(&mut self, system: &mut impl Rates, step: Step<'_>, tolerance: f64) -> Trial {
+        let (Step { y, h, .. }, n, tableau) = (step, step.y.len(), P::TABLEAU);
         self.from[..n].copy_from_slice(y);
         for i in 1..tableau.stages {
-            self.combine(tableau.a[i], n, h);
+            self.combine_for::<P>(i, n, h);
             self.evaluate(system, tableau.c[i] * h, i);
             if i + 2 == tableau.stages {
                 self.other_end.copy_from_slice(&self.stage[..n]);
@@ -218,30 +231,49 @@ impl Workspace {
                 self.end.copy_from_slice(&self.stage[..n]);
             }
         }
-        let (mut error, rounding) = self.error(tableau, n, h, tolerance);
+        let (mut error, rounding) = self.error::<P>(n, h, tolerance);
         if system.is_algebraic() {
-            let errors: Vec<f64> = (0..y.len()).map(|j| self.estimate(tableau, h, j)).collect();
+            let errors: Vec<f64> = (0..y.len()).map(|j| self.estimate::<P>(h, j)).collect();
             error = error.max(system.algebraic_error(h, &self.end, &errors, tolerance));
         }
         self.outcome(error, rounding, tableau.stages - 1)
     }
 
+    /// The state at which the rates of a stage are taken.
+    fn combine_for<P: Pair>(&mut self, stage: usize, n: usize, h: f64) {
+        match stage {
+            1 => self.combine::<StageOf<P, 1>>(n, h),
+            2 => self.combine::<StageOf<P, 2>>(n, h),
+            3 => self.combine::<StageOf<P, 3>>(n, h),
+            4 => self.combine::<StageOf<P, 4>>(n, h),
+            5 => self.combine::<StageOf<P, 5>>(n, h),
+            6 => self.combine::<StageOf<P, 6>>(n, h),
+            7 => self.combine::<StageOf<P, 7>>(n, h),
+            8 => self.combine::<StageOf<P, 8>>(n, h),
+            9 => self.combine::<StageOf<P, 9>>(n, h),
+            10 => self.combine::<StageOf<P, 10>>(n, h),
+            11 => self.combine::<StageOf<P, 11>>(n, h),
+            12 => self.combine::<StageOf<P, 12>>(n, h),
+            13 => self.combine::<StageOf<P, 13>>(n, h),
+            14 => self.combine::<StageOf<P, 14>>(n, h),
+            15 => self.combine::<StageOf<P, 15>>(n, h),
+            _ => unreachable!("there are {MAX_STAGES} stages at most, and the first needs no state"),
+        }
+    }
+
     /// The state at which a stage's rate is taken, given its weights.
-    fn combine(&mut self, weights: &[f64], n: usize, h: f64) {
+    fn combine<W: Weights>(&mut self, n: usize, h: f64) {
         let Workspace { from, stage, k, .. } = self;
         if n <= FEW {
             for (j, (s, y)) in stage.iter_mut().zip(from).enumerate().take(n) {
-                *s = *y + h * weighed(weights, k, j);
+                *s = *y + h * weighed::<W>(k, j);
             }
             return;
         }
         let (from, stage) = (from.as_chunks::<PART>().0, stage.as_chunks_mut::<PART>().0);
-        let listed: Listed = if from.len() > SHORT { terms(weights, k).collect() } else { Listed::new() };
+        let k = parts::<W>(k, from.len());
         for (block, (from, stage)) in from.iter().zip(stage).enumerate() {
-            let sums = match listed.is_empty() {
-                true => weigh(terms(weights, k), block),
-                false => weigh(listed.iter().copied(), block),
-            };
+            let sums = weigh::<W>(&k, block);
             for i in 0..PART {
                 stage[i] = from[i] + h * sums[i];
             }
@@ -258,28 +290,19 @@ impl Workspace {
     }
 
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
-    fn error(&mut self, tableau: &Tableau, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
+    fn error<P: Pair>(&mut self, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
         let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
-        let blur = 4.0 * self.resolution / tableau.c[1];
-        let mut listed: [Listed; 2] = Default::default();
-        if n > SHORT * PART {
-            listed.iter_mut().zip(tableau.e).for_each(|(list, row)| list.extend(terms(row, &self.k)));
-        }
-        let estimates = |number: usize, block: usize| {
-            let (row, list) = (tableau.e[number], &listed[number]);
-            match n {
-                0..=FEW => std::array::from_fn(|j| if j < n { weighed(row, &self.k, j) } else { 0.0 }),
-                _ if list.is_empty() => weigh(terms(row, &self.k), block),
-                _ => weigh(list.iter().copied(), block),
-            }
-        };
+        let blur = 4.0 * self.resolution / P::TABLEAU.c[1];
         // The last stage is the end of the step.
         let (from, end) = (self.from.as_chunks::<PART>().0, self.stage.as_chunks::<PART>().0);
+        let high = parts::<EstimateOf<P, 0>>(&self.k, from.len());
+        let low = parts::<EstimateOf<P, 1>>(&self.k, from.len());
         for (block, (from, end)) in from.iter().zip(end).enumerate() {
             let first = block * PART;
-            let mut estimate = estimates(0, block);
-            if tableau.e.len() > 1 {
-                for (high, low) in estimate.iter_mut().zip(estimates(1, block)) {
+            let mut estimate = self.estimates::<EstimateOf<P, 0>>(&high, n, block);
+            if P::TABLEAU.e.len() > 1 {
+                for (high, low) in estimate.iter_mut().zip(self.estimates::<EstimateOf<P, 1>>(&low, n, block))
+                {
                     *high = join_estimates(h * *high, h * low);
                 }
             } else {
@@ -312,12 +335,24 @@ impl Workspace {
         (error, rounding)
     }
 
+    /// The estimates of a part of `n` components.
+    #[inline(always)]
+    fn estimates<W: Weights>(&self, k: &Parts<'_>, n: usize, block: usize) -> [f64; PART] {
+        match n {
+            0..=FEW => std::array::from_fn(|j| if j < n { weighed::<W>(&self.k, j) } else { 0.0 }),
+            _ => weigh::<W>(k, block),
+        }
+    }
+
     /// The estimated error of one component at the end of the step, with its sign.
-    fn estimate(&self, tableau: &Tableau, h: f64, component: usize) -> f64 {
-        let high = h * weighed(tableau.e[0], &self.k, component);
-        match tableau.e.get(1) {
-            None => high,
-            Some(low) => join_estimates(high, h * weighed(low, &self.k, component)).copysign(high),
+    fn estimate<P: Pair>(&self, h: f64, component: usize) -> f64 {
+        let high = h * weighed::<EstimateOf<P, 0>>(&self.k, component);
+        match P::TABLEAU.e.len() {
+            1 => high,
+            _ => {
+                let low = h * weighed::<EstimateOf<P, 1>>(&self.k, component);
+                join_estimates(high, low).copysign(high)
+            }
         }
     }
 }

@@ -171,6 +171,34 @@ pub(super) fn location_method<'w>(crossing: &'w ZeroCrossing, state: &State) -> 
     }
 }
 
+/// The one level at which the sides of an atom meet that compares a variable with it: the variable, the level, and the side
+/// on which the difference has the sign that it has now; 0 where a formula does not tell. `value` gives that of a formula for
+/// the level.
+pub(super) fn level_of_dense(
+    crossing: &ZeroCrossing,
+    sign: Sign,
+    value: impl FnOnce(&Program) -> Option<f64>,
+) -> Option<(usize, f64, f64)> {
+    if !matches!(sign, Sign::Plus | Sign::Minus) {
+        return None;
+    }
+    match crossing {
+        ZeroCrossing::Formula { variable, level } => Some((*variable, value(level)?, 0.0)),
+        ZeroCrossing::Search(Some(AffineSum { constant, terms })) if terms.len() == 1 => {
+            let (variable, factor) = terms[0];
+            Some((variable, -constant / factor, sign_of(sign) * factor))
+        }
+        _ => None,
+    }
+}
+
+/// True if values within some bounds stay away from a level, on this side of it, by more than the relative error of
+/// integration.
+pub(super) fn is_clear_of(bounds: Interval, level: f64, side: f64, error: f64) -> bool {
+    let margin = error.max(1e-9) * (level.abs() + bounds.magnitude());
+    (side >= 0.0 && level < bounds.lo - margin) || (side <= 0.0 && level > bounds.hi + margin)
+}
+
 impl CrossingDetector {
     /// True if the dense output of a parameter stays away from the one level at which its atom's sides meet, by more
     /// than the relative error of integration, `error`. Most steps need no other test.
@@ -181,21 +209,12 @@ impl CrossingDetector {
         sign: Sign,
         error: f64,
     ) -> bool {
-        if !matches!(sign, Sign::Plus | Sign::Minus) {
+        let Some((variable, level, side)) =
+            level_of_dense(crossing, sign, |level| Some(self.level(path, level)))
+        else {
             return false;
-        }
-        // The side on which the sum has the sign that the difference has; a formula does not tell.
-        let (variable, level, side) = match crossing {
-            ZeroCrossing::Formula { variable, level } => (*variable, self.level(path, level), 0.0),
-            ZeroCrossing::Search(Some(AffineSum { constant, terms })) if terms.len() == 1 => {
-                let (variable, factor) = terms[0];
-                (variable, -constant / factor, sign_of(sign) * factor)
-            }
-            _ => return false,
         };
-        let Some(bounds) = path.dense_bounds(variable) else { return false };
-        let margin = error.max(1e-9) * (level.abs() + bounds.magnitude());
-        (side >= 0.0 && level < bounds.lo - margin) || (side <= 0.0 && level > bounds.hi + margin)
+        path.dense_bounds(variable).is_some_and(|bounds| is_clear_of(bounds, level, side, error))
     }
 
     /// The value of the variable at which the sides of an atom meet.

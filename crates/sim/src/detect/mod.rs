@@ -3,12 +3,14 @@
 //! - [`search`]: the next event of a module on a stretch. Begin here.
 //! - [`crossing`]: the crossings of one atom, by formula or by root isolation
 //! - [`doubt`]: crossings that the error of integration may hide or feign
+//! - [`quiet`]: a short test that spares most searches
 //! - [`pulse`]: rates that are large between the stages of a step
 //! - [`signs`]: signs of the differences that conditions compare, and their consequences
 
 pub mod crossing;
 pub mod doubt;
 pub mod pulse;
+pub mod quiet;
 pub mod search;
 pub mod signs;
 

@@ -42,6 +42,13 @@ pub struct SearchResult {
     pub near: u64,
 }
 
+impl SearchResult {
+    /// True if the path has no event, nothing changes on it, and no sides come near each other.
+    pub fn is_nothing(&self) -> bool {
+        self.event.is_none() && self.changes.is_empty() && self.near == 0
+    }
+}
+
 /// An atom whose sign may change on the path.
 struct TrackedAtom {
     atom: usize,

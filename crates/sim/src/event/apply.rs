@@ -5,12 +5,12 @@ use std::sync::LazyLock;
 use smallvec::SmallVec;
 
 use super::chance::{self, Undrawn};
-use super::{EventStage, Firing, clear};
+use super::{EventStage, Firing};
 use crate::budget;
 use crate::error::{Error, Site};
 use crate::log::Event;
 use crate::memory::Shortage;
-use crate::scratch::Scratch;
+use crate::scratch::{Scratch, clear};
 use crate::world::World;
 use crate::world::context::Context;
 use crate::world::life::{End, LifeClass};

@@ -1,7 +1,8 @@
 //! The loop of event iteration: rounds of productions, then the selection of modes, then the start of flows.
 
-use super::{EventStage, Firing, clear, lives};
+use super::{EventStage, Firing, lives};
 use crate::error::{Error, Site};
+use crate::scratch::clear;
 use dlsys_model::Truth;
 
 /// Most rounds of productions at one instant.

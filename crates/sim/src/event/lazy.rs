@@ -1,9 +1,10 @@
 //! The events of lazy modules: they are born and replaced without ever having a state.
 
 use super::apply::{Refusal, residual};
-use super::{EventStage, Firing, LONG, chance, clear, lives};
+use super::{EventStage, Firing, chance, lives};
 use crate::error::Error;
 use crate::flow::prediction::values_at_event;
+use crate::scratch::{LONG, clear};
 use crate::world::context::Context;
 use crate::world::life::{End, Life, Newborn, REFUSED};
 use crate::world::new_modules::kinds_of;

@@ -6,7 +6,7 @@
 use super::EventStage;
 use std::collections::HashSet;
 
-use crate::event::{LONG, clear};
+use crate::scratch::{LONG, clear};
 use crate::world::context::Context;
 use crate::world::state::{Signs, State};
 use dlsys_model::{KindId, Rule, Sign};

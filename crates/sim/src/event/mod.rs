@@ -45,9 +45,6 @@ use transition::Recorder;
 
 pub use iterate::MAX_ROUNDS;
 
-/// Lists that were longer are not kept for the next instant.
-const LONG: usize = 1 << 18;
-
 /// A life of no more than so many resolutions of time is short.
 pub const SHORT_LIFE: f64 = 64.0;
 
@@ -140,13 +137,5 @@ impl<'m> EventStage<'_, 'm> {
     /// Gives a lazy module the state that it would have, had it never been lazy.
     fn materialise(&mut self, id: ModuleId) {
         lives::materialise(self.world, &self.setup.model.rules, id, self.instant, self.scratch);
-    }
-}
-
-/// Empties a list, and gives back its memory if that is much.
-fn clear<T>(list: &mut Vec<T>) {
-    list.clear();
-    if list.capacity() > LONG {
-        *list = Vec::new();
     }
 }

@@ -90,6 +90,16 @@ impl CoupledSolution {
         self.stretch(component, from).map_or(self.end, |(dense, _)| dense.end)
     }
 
+    /// Bounds of a component from an instant to the end; None for one that has not been integrated yet.
+    pub fn hull(&self, component: usize, from: SimTime) -> Option<Interval> {
+        let Track { first, count, component } = self.track(component);
+        let own = &self.stretches[first as usize..(first + count) as usize];
+        // The last one is there however late it is.
+        let passed = own.iter().take_while(|dense| from.since(dense.end) >= 0.0).count();
+        let ahead = own[passed.min(own.len().saturating_sub(1))..].iter();
+        ahead.map(|dense| dense.bounds(component as usize)).reduce(Interval::hull)
+    }
+
     /// A component along a stretch of time.
     pub fn piece(&self, component: usize, start: SimTime, h: f64) -> Option<DenseComponent<'_>> {
         let (dense, component) = self.stretch(component, start)?;

@@ -47,7 +47,7 @@ fn step(tab: &Tableau, f: Rate, t: f64, h: f64, y: [f64; 2]) -> ([f64; 2], [[f64
 fn dense(tab: &Tableau, y0: f64, y1: f64, hk: &[f64; 16]) -> Vec<f64> {
     match tab.order {
         5 => dopri5_dense(&[y0], &[y1], &std::array::from_fn(|i| [hk[i]]))[0].to_vec(),
-        _ => dop853_dense(y0, y1, hk).to_vec(),
+        _ => dop853_dense(&[y0], &[y1], &hk.map(|k| [k]))[0].to_vec(),
     }
 }
 
@@ -171,7 +171,7 @@ fn bernstein_form_equals_the_nested_form() {
 #[test]
 fn straight_lines_stay_straight() {
     // A constant rate must not meet the large weights: the coefficients are those of a line to rounding.
-    let b = dop853_dense(1.0, 1.25, &[0.25; 16]);
+    let [b] = dop853_dense(&[1.0], &[1.25], &[[0.25]; 16]);
     for (i, b) in b.iter().enumerate() {
         assert!((b - (1.0 + 0.25 * i as f64 / 7.0)).abs() < 3e-16);
     }

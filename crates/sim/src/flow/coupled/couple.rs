@@ -4,6 +4,7 @@ use crate::flow::FlowStage;
 use std::collections::HashSet;
 
 use crate::error::Error;
+use crate::scratch::clear;
 use dlsys_tree::ModuleId;
 
 /// The modules that an instant affects, by its consequence for them.
@@ -127,7 +128,7 @@ impl FlowStage<'_, '_> {
                 affected.dependent.push(id);
             }
         }
-        near.clear();
+        clear(&mut near);
         self.flows.coupled.loosened = near;
     }
 

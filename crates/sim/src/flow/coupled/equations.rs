@@ -1,6 +1,7 @@
 //! The right-hand side of the equations of coupled modules, as the integrators evaluate it.
 
 use crate::flow::coupled::algebra::AlgebraicError;
+use crate::flow::coupled::columns::Whole;
 use crate::flow::coupled::lanes::EvaluationPoint;
 use crate::flow::coupled::rows::VariableSource;
 use crate::flow::coupled::system::System;
@@ -19,6 +20,8 @@ pub struct Equations<'s> {
     solution: Option<&'s CoupledSolution>,
     /// Working memory of evaluations.
     pub memory: RateWorkspace,
+    /// What the table is made of, if the system has none.
+    pub whole: Option<Whole<'s>>,
 }
 
 /// Working memory of evaluations.
@@ -57,7 +60,8 @@ impl<'s> Equations<'s> {
         rules: &'s [Rule],
         solution: Option<&'s CoupledSolution>,
     ) -> Equations<'s> {
-        Equations { system, rules, solution, memory: RateWorkspace { read_at: None, ..memory } }
+        let memory = RateWorkspace { read_at: None, ..memory };
+        Equations { system, rules, solution, memory, whole: None }
     }
 
     /// Reads the inputs at a time since the start of the step.
@@ -211,6 +215,9 @@ impl Rates for Equations<'_> {
     }
 
     fn couplings(&self) -> Vec<(u32, u32)> {
+        if let Some(whole) = self.whole {
+            return whole.ask(self.rules, self.solution, |equations| equations.couplings());
+        }
         let mut all = Vec::new();
         for row in &self.system.table.rows {
             self.system.row_partials(self.rules, row, |rate, partial| all.push((rate, partial.component)));
@@ -219,6 +226,9 @@ impl Rates for Equations<'_> {
     }
 
     fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>) {
+        if let Some(whole) = self.whole {
+            return whole.ask(self.rules, self.solution, |equations| equations.partials(tau, y, out));
+        }
         let mut variables = std::mem::take(&mut self.memory.variables);
         let mut scratch = std::mem::take(&mut self.memory.scratch);
         let mut values = Vec::new();
@@ -242,6 +252,6 @@ impl Rates for Equations<'_> {
     }
 
     fn modules(&self) -> u64 {
-        self.system.table.rows.len() as u64
+        self.system.modules
     }
 }

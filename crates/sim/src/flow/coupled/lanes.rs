@@ -2,8 +2,8 @@
 //!
 //! For each variable that the program reads, a [`LaneColumn`] holds the sources of that variable in all rows of a chunk.
 
-use crate::flow::coupled::rows::{EquationRow, EquationTable, VariableSource, program};
-use dlsys_expr::{LANES, Lanes};
+use crate::flow::coupled::rows::{EquationRow, EquationTable, VariableSource};
+use dlsys_expr::{LANES, Lanes, Program};
 use dlsys_model::Rule;
 use smallvec::SmallVec;
 use std::ops::Range;
@@ -19,12 +19,33 @@ pub struct LaneBatches {
     places: Vec<u32>,
     /// Lanes of mixed columns that read neither a component nor an input, with their sources.
     others: Vec<(u32, VariableSource)>,
+    /// The first column of the chunk that has begun.
+    first_column: usize,
+}
+
+/// What tells the program of a row's rates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ProgramKey {
+    /// Index of the module's rule.
+    pub rule: usize,
+    /// Index of the active `solve` clause in the rule.
+    pub solve: usize,
+    /// All equations are integrated, those with closed forms too.
+    pub numeric_only: bool,
+}
+
+impl ProgramKey {
+    /// The program of the rates.
+    pub fn program(self, rules: &[Rule]) -> &Program {
+        let solve = &rules[self.rule].solves[self.solve];
+        if self.numeric_only { &solve.rates } else { &solve.numeric_rates }
+    }
 }
 
 /// Rows that are evaluated at once: at most [`LANES`], with the same program.
 #[derive(Clone, Copy, Debug)]
 struct Chunk {
-    first_row: usize,
+    key: ProgramKey,
     rows: usize,
     /// The number of registers that the rule's variables take.
     registers: usize,
@@ -37,9 +58,10 @@ struct Chunk {
 
 /// One variable in all rows of a chunk. The numbers are the starts of its values in a list.
 #[derive(Clone, Copy, Debug)]
-enum LaneColumn {
+pub enum LaneColumn {
     Time,
-    Age,
+    /// Ages, of rows from the first number on.
+    Age(usize),
     Fixed(usize),
     State(LanePlaces),
     /// Components and inputs; the numbers of inputs follow those of the components.
@@ -52,7 +74,7 @@ enum LaneColumn {
 
 /// Places in a vector; mostly consecutive, because rows stand in string order.
 #[derive(Clone, Copy, Debug)]
-enum LanePlaces {
+pub enum LanePlaces {
     Run(usize),
     Any(usize),
 }
@@ -72,49 +94,91 @@ pub struct EvaluationPoint<'r> {
 }
 
 impl LaneBatches {
-    /// Puts rows with the same program together, in chunks of at most [`LANES`].
-    pub fn fill(&mut self, table: &EquationTable, rules: &[Rule]) {
+    /// Removes all chunks.
+    pub fn clear(&mut self) {
         self.chunks.clear();
         self.rows.clear();
         self.columns.clear();
         self.numbers.clear();
         self.places.clear();
         self.others.clear();
-        let key = |row: &EquationRow| (row.rule, row.solve, row.numeric_only);
-        let mut keys: SmallVec<[_; 4]> = SmallVec::new();
+    }
+
+    /// Puts rows with the same program together, in chunks of at most [`LANES`].
+    pub fn fill(&mut self, table: &EquationTable, rules: &[Rule]) {
+        self.clear();
+        let mut keys: SmallVec<[ProgramKey; 4]> = SmallVec::new();
         for row in table.rows.iter().filter(|row| row.rates > 0) {
-            if keys.last() != Some(&key(row)) && !keys.contains(&key(row)) {
-                keys.push(key(row));
+            if keys.last() != Some(&row.key()) && !keys.contains(&row.key()) {
+                keys.push(row.key());
             }
         }
-        for of in keys {
+        for key in keys {
             let first = self.rows.len();
             for (n, row) in table.rows.iter().enumerate() {
-                if row.rates > 0 && key(row) == of {
+                if row.rates > 0 && row.key() == key {
                     self.rows.push(n as u32);
                 }
             }
             for first in (first..self.rows.len()).step_by(LANES) {
-                self.chunk(table, rules, first, LANES.min(self.rows.len() - first));
+                self.chunk(table, rules, first..(first + LANES).min(self.rows.len()));
             }
         }
     }
 
     /// Adds a chunk of rows that have the same program.
-    fn chunk(&mut self, table: &EquationTable, rules: &[Rule], first_row: usize, rows: usize) {
-        let row = &table.rows[self.rows[first_row] as usize];
-        let first_column = self.columns.len();
-        for &variable in program(rules, row).reads() {
-            let column = self.column(table, first_row..first_row + rows, variable);
-            self.columns.push((variable as u32, column));
+    fn chunk(&mut self, table: &EquationTable, rules: &[Rule], rows: Range<usize>) {
+        let all: SmallVec<[&EquationRow; LANES]> =
+            self.rows[rows.clone()].iter().map(|row| &table.rows[*row as usize]).collect();
+        let (key, sources, switches) = (all[0].key(), all[0].sources, table.switches_of(all[0]).len());
+        self.begin_chunk();
+        for &variable in key.program(rules).reads() {
+            let column = if variable == sources {
+                LaneColumn::Time
+            } else if variable == sources + 1 {
+                LaneColumn::Age(rows.start)
+            } else if let Some(switch) = variable.checked_sub(sources + 2) {
+                self.numbers(all.iter().map(|row| table.switches_of(row)[switch]))
+            } else {
+                let read = all.iter().map(|row| table.sources[row.first_source + variable]);
+                let read: SmallVec<[VariableSource; LANES]> = read.collect();
+                self.column(table.places.len(), &read)
+            };
+            self.push_column(variable, column);
         }
-        let first_place = self.places.len();
-        let all = &self.rows[first_row..first_row + rows];
-        self.places.extend(all.iter().map(|row| table.rows[*row as usize].first_rate as u32));
+        self.end_chunk(key, sources + 2 + switches, all.iter().map(|row| row.first_rate as u32));
+    }
+
+    /// Begins a chunk: its columns follow, in the order in which its program reads the variables.
+    pub fn begin_chunk(&mut self) {
+        self.first_column = self.columns.len();
+    }
+
+    /// Adds the column of a variable to the chunk that has begun.
+    pub fn push_column(&mut self, variable: usize, column: LaneColumn) {
+        self.columns.push((variable as u32, column));
+    }
+
+    /// Ends a chunk of rows with the same program, given the number of registers that the variables of the rule take, and the
+    /// component of the first rate of each row.
+    pub fn end_chunk(
+        &mut self,
+        key: ProgramKey,
+        registers: usize,
+        rates: impl ExactSizeIterator<Item = u32>,
+    ) {
+        let (rows, first_place) = (rates.len(), self.places.len());
+        self.places.extend(rates);
         let rates = self.run(first_place);
-        let (registers, columns) =
-            (row.sources + 2 + table.switches_of(row).len(), self.columns.len() - first_column);
-        self.chunks.push(Chunk { first_row, rows, registers, first_column, columns, rates });
+        let (first_column, columns) = (self.first_column, self.columns.len() - self.first_column);
+        self.chunks.push(Chunk { key, rows, registers, first_column, columns, rates });
+    }
+
+    /// A column of numbers.
+    pub fn numbers(&mut self, numbers: impl Iterator<Item = f64>) -> LaneColumn {
+        let first = self.numbers.len();
+        self.numbers.extend(numbers);
+        LaneColumn::Fixed(first)
     }
 
     /// The last places of the list, from index `from` on; they are removed from it if they are consecutive.
@@ -127,46 +191,31 @@ impl LaneBatches {
         LanePlaces::Any(from)
     }
 
-    /// The sources of one variable of some rows with the same program.
-    fn column(&mut self, table: &EquationTable, range: Range<usize>, variable: usize) -> LaneColumn {
-        let rows = self.rows[range.clone()].iter().map(|row| &table.rows[*row as usize]);
-        let sources = rows.clone().next().map_or(0, |row| row.sources);
-        if variable == sources {
-            return LaneColumn::Time;
-        }
-        if variable == sources + 1 {
-            return LaneColumn::Age;
-        }
-        let (number, place) = (self.numbers.len(), self.places.len());
-        if variable > sources {
-            self.numbers.extend(rows.map(|row| table.switches_of(row)[variable - sources - 2]));
-            return LaneColumn::Fixed(number);
-        }
-        let all = rows.map(|row| table.sources[row.first_source + variable]);
-        // Most variables are components or inputs.
-        let components = table.places.len() as u32;
+    /// The column of a variable with these sources, in a system of so many components. Most variables are components or
+    /// inputs.
+    pub fn column(&mut self, components: usize, sources: &[VariableSource]) -> LaneColumn {
+        let place = self.places.len();
         let mut inputs = false;
-        for source in all.clone() {
-            match source {
+        for source in sources {
+            match *source {
                 VariableSource::State(component) => self.places.push(component),
                 VariableSource::Input(input) => {
                     inputs = true;
-                    self.places.push(components + input);
+                    self.places.push(components as u32 + input);
                 }
                 _ => {
                     self.places.truncate(place);
-                    return self.other_column(table, range, variable);
+                    return self.other_column(components, sources);
                 }
             }
         }
         if inputs { LaneColumn::Known(place) } else { LaneColumn::State(self.run(place)) }
     }
 
-    /// The sources of a variable that is neither a component nor an input in some row.
-    fn other_column(&mut self, table: &EquationTable, range: Range<usize>, variable: usize) -> LaneColumn {
-        let LaneBatches { rows, numbers, places, others, .. } = self;
-        let all = rows[range].iter().map(|row| &table.rows[*row as usize]);
-        let all = all.map(|row| table.sources[row.first_source + variable]);
+    /// The column of a variable that is neither a component nor an input in some row.
+    fn other_column(&mut self, components: usize, sources: &[VariableSource]) -> LaneColumn {
+        let LaneBatches { numbers, places, others, .. } = self;
+        let all = sources.iter().copied();
         let (number, place, mixed) = (numbers.len(), places.len(), others.len());
         let fixed = |source| match source {
             VariableSource::Fixed(x) => Some(x),
@@ -184,11 +233,10 @@ impl LaneBatches {
             places.extend(all.filter_map(sum));
             return LaneColumn::RowAggregate(place);
         }
-        let components = table.places.len() as u32;
         for (lane, source) in all.enumerate() {
             places.push(match source {
                 VariableSource::State(component) => component,
-                VariableSource::Input(input) => components + input,
+                VariableSource::Input(input) => components as u32 + input,
                 other => {
                     others.push((lane as u32, other));
                     0
@@ -208,19 +256,18 @@ impl LaneBatches {
         out: &mut [f64],
     ) {
         for chunk in &self.chunks {
-            let rows = &self.rows[chunk.first_row..chunk.first_row + chunk.rows];
-            let program = program(rules, &table.rows[rows[0] as usize]);
+            let program = chunk.key.program(rules);
             if registers.len() < chunk.registers {
                 registers.resize(chunk.registers, [0.0; LANES]);
             }
             for (variable, column) in &self.columns[chunk.first_column..chunk.first_column + chunk.columns] {
-                let register = &mut registers[*variable as usize][..rows.len()];
-                self.gather(table, *column, rows, point, register);
+                let register = &mut registers[*variable as usize][..chunk.rows];
+                self.gather(table, *column, point, register);
             }
-            for (output, register) in program.eval_rows(registers, rows.len()).enumerate() {
-                let rates = &registers[register][..rows.len()];
+            for (output, register) in program.eval_rows(registers, chunk.rows).enumerate() {
+                let rates = &registers[register][..chunk.rows];
                 match chunk.rates {
-                    LanePlaces::Run(first) => out[first + output..][..rows.len()].copy_from_slice(rates),
+                    LanePlaces::Run(first) => out[first + output..][..chunk.rows].copy_from_slice(rates),
                     LanePlaces::Any(first) => {
                         for (rate, place) in rates.iter().zip(&self.places[first..]) {
                             out[*place as usize + output] = *rate;
@@ -232,14 +279,7 @@ impl LaneBatches {
     }
 
     /// Fills a register with one variable of some rows.
-    fn gather(
-        &self,
-        table: &EquationTable,
-        column: LaneColumn,
-        rows: &[u32],
-        point: &EvaluationPoint,
-        to: &mut [f64],
-    ) {
+    fn gather(&self, table: &EquationTable, column: LaneColumn, point: &EvaluationPoint, to: &mut [f64]) {
         let pick = |from: &[f64], first: usize, to: &mut [f64]| {
             for (lane, place) in to.iter_mut().zip(&self.places[first..]) {
                 *lane = from[*place as usize];
@@ -248,14 +288,14 @@ impl LaneBatches {
         let tau = point.tau;
         match column {
             LaneColumn::Time => to.fill(table.start.to_f64() + tau),
-            LaneColumn::Age => {
-                for (lane, row) in to.iter_mut().zip(rows) {
+            LaneColumn::Age(first) => {
+                for (lane, row) in to.iter_mut().zip(&self.rows[first..]) {
                     *lane = table.rows[*row as usize].age + tau;
                 }
             }
-            LaneColumn::Fixed(first) => to.copy_from_slice(&self.numbers[first..first + rows.len()]),
+            LaneColumn::Fixed(first) => to.copy_from_slice(&self.numbers[first..first + to.len()]),
             LaneColumn::State(LanePlaces::Run(first)) => {
-                to.copy_from_slice(&point.y[first..first + rows.len()])
+                to.copy_from_slice(&point.y[first..first + to.len()])
             }
             LaneColumn::State(LanePlaces::Any(first)) => pick(point.y, first, to),
             LaneColumn::Known(first) => pick(point.known, first, to),

@@ -9,12 +9,14 @@
 //!                                     └▶ step            a new common step ─▶ detect ─▶ schedule
 //!                                        step ─▶ repair   stiff members that the step does not resolve
 //! system ─▶ rows (table of equations) ─▶ algebra, lanes, aggregates ─▶ equations (right-hand side) ─▶ integrator
+//! columns ─▶ the equations of a region without a table
 //! linear ─▶ exponentials of matrices in place of steps
 //! ```
 
 pub mod aggregates;
 pub mod algebra;
 pub mod blend;
+pub mod columns;
 pub mod couple;
 pub mod equations;
 pub mod lanes;

@@ -27,6 +27,7 @@
 //! exponentially beyond that.
 
 use crate::flow::FlowStage;
+use crate::flow::coupled::columns::Whole;
 use crate::flow::coupled::equations::{Equations, RateWorkspace};
 use crate::flow::coupled::system::{Membership, System, integrated};
 use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator, StepRequest};
@@ -351,9 +352,13 @@ impl FlowStage<'_, '_> {
         let number = |component: u32| numbers.get(component as usize).copied().filter(|n| *n != NOT_HERE);
         let rules = &self.setup.model.rules;
         let frozen = self.setup.settings.is_sliced();
-        let (world, members, start) = (&*self.world, &region.members, now);
-        system.rebuild(rules, &Membership { world, members, start, frozen }, number);
-        system.prepare_rates(rules);
+        let modules = Membership { world: &*self.world, members: &region.members, start: now, frozen };
+        let is_explicit = stiff.is_none() && !control.stiff && !frozen;
+        let is_bare = is_explicit && system.gather(rules, &modules, y.len(), number);
+        if !is_bare {
+            system.rebuild(rules, &modules, number);
+            system.prepare_rates(rules);
+        }
         for &component in &*components {
             numbers[component as usize] = NOT_HERE;
         }
@@ -374,6 +379,9 @@ impl FlowStage<'_, '_> {
                 return None;
             }
             let mut equations = Equations::within(std::mem::take(memory), system, rules, Some(solution));
+            // The start of the step moves on.
+            let modules = Membership { start: from, ..modules };
+            equations.whole = is_bare.then_some(Whole { modules, components });
             let end = Some(solution.end);
             let stats = &mut self.log.stats;
             let settings = &self.setup.coupled_settings;

@@ -3,9 +3,9 @@
 //! The table is data: the order in which algebraic components are solved for (`algebra`) and the batches in which rates
 //! are evaluated (`lanes`) are derived from it, and [`System`](super::system::System) holds all three.
 
+use crate::flow::coupled::lanes::ProgramKey;
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::CoupledSolution;
-use dlsys_expr::Program;
 use dlsys_model::Rule;
 use dlsys_tree::{ModuleId, SimTime};
 
@@ -103,10 +103,11 @@ pub struct RowAggregate {
     pub count: usize,
 }
 
-/// The program of a row's rates.
-pub fn program<'s>(rules: &'s [Rule], row: &EquationRow) -> &'s Program {
-    let solve = &rules[row.rule].solves[row.solve];
-    if row.numeric_only { &solve.rates } else { &solve.numeric_rates }
+impl EquationRow {
+    /// What tells the program of the rates.
+    pub fn key(&self) -> ProgramKey {
+        ProgramKey { rule: self.rule, solve: self.solve, numeric_only: self.numeric_only }
+    }
 }
 
 impl EquationTable {

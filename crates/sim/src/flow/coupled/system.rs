@@ -23,12 +23,15 @@ pub struct System {
     pub lanes: LaneBatches,
     /// The terms of aggregates, in batches of children with the same term.
     pub terms: Vec<TermBatch>,
+    /// The number of modules with equations.
+    pub modules: u64,
 }
 
 /// More modules than this are not likely to be in the processor's caches.
 const REGION: usize = 256;
 
 /// The modules whose equations form a system.
+#[derive(Clone, Copy)]
 pub struct Membership<'w> {
     /// The world at the start of the step.
     pub world: &'w World,
@@ -64,8 +67,17 @@ impl System {
         self.finish(rules);
     }
 
+    /// Removes all equations.
+    pub(super) fn clear(&mut self, start: SimTime) {
+        self.table.clear(start);
+        self.lanes.clear();
+        self.terms.clear();
+        (self.algebra, self.modules) = (Algebra::default(), 0);
+    }
+
     /// Derives the orders of evaluation from the table.
     fn finish(&mut self, rules: &[Rule]) {
+        self.modules = self.table.rows.len() as u64;
         self.algebra = Algebra::new(&self.table, rules);
         self.table.batch_terms(&mut self.terms);
     }
@@ -182,7 +194,7 @@ impl EquationTable {
         let first_source = self.sources.len();
         self.sources.resize(first_source + rule.variables - 2, VariableSource::Fixed(0.0));
         let clause = &rule.solves[state.solve.expect("a module with equations")];
-        for read in clause.stepping.reads() {
+        for read in clause.stepping.reads(state.numeric_only) {
             let (module, moves) = match read.neighbour.map(|n| state.context.context()[n]) {
                 None => (id, Some(state)),
                 Some(module) => (module, world.state(module)),
@@ -218,7 +230,7 @@ impl EquationTable {
 
     /// The source of a parameter of a module with this state. `x` gives its value in the tree.
     #[inline]
-    fn source(
+    pub(super) fn source(
         &mut self,
         state: Option<&State>,
         parameter: usize,

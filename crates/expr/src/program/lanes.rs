@@ -1,0 +1,197 @@
+//! Evaluation of a program for many rows at once, in lanes of vector registers.
+
+use super::{Instruction, Program, Register};
+use crate::{Binary, Unary, Value};
+
+/// Rows that are evaluated at once by [`Program::eval_lanes`].
+pub const LANES: usize = 32;
+
+/// One value of each row.
+pub type Lanes = [f64; LANES];
+
+/// Lanes that fit into the processor's registers together, so that the result may overwrite an operand without a copy.
+const PART: usize = 8;
+
+/// Applies an operation to the first `PARTS` parts of the lanes.
+#[inline(always)]
+fn each<const PARTS: usize>(registers: &mut [Lanes], [to, a, b]: [Register; 3], f: impl Fn(f64, f64) -> f64) {
+    let [to, a, b] = [to, a, b].map(|register| register as usize);
+    // Looked at once, not for every part.
+    assert!(to < registers.len() && a < registers.len() && b < registers.len());
+    for i in 0..PARTS {
+        let [mut x, y] = [a, b].map(|register| registers[register].as_chunks::<PART>().0[i]);
+        for (x, y) in x.iter_mut().zip(y) {
+            *x = f(*x, y);
+        }
+        registers[to].as_chunks_mut::<PART>().0[i] = x;
+    }
+}
+
+/// The same for an operation on three operands.
+#[inline(always)]
+fn each_of_three<const PARTS: usize>(
+    registers: &mut [Lanes],
+    [to, a, b, c]: [Register; 4],
+    f: impl Fn(f64, f64, f64) -> f64,
+) {
+    let [to, a, b, c] = [to, a, b, c].map(|register| register as usize);
+    let all = registers.len();
+    assert!(to < all && a < all && b < all && c < all);
+    for i in 0..PARTS {
+        let [mut x, y, z] = [a, b, c].map(|register| registers[register].as_chunks::<PART>().0[i]);
+        for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+            *x = f(*x, y, z);
+        }
+        registers[to].as_chunks_mut::<PART>().0[i] = x;
+    }
+}
+
+/// The same for operations that take so long that all else counts little.
+#[inline(never)]
+#[expect(clippy::needless_range_loop, reason = "the rows of three registers, two of which may be one")]
+fn each_of(
+    registers: &mut [Lanes],
+    rows: usize,
+    [to, a, b]: [Register; 3],
+    f: &mut dyn FnMut(f64, f64) -> f64,
+) {
+    let [to, a, b] = [to, a, b].map(|register| register as usize);
+    for row in 0..rows {
+        let value = f(registers[a][row], registers[b][row]);
+        registers[to][row] = value;
+    }
+}
+
+impl Program {
+    /// Evaluates all roots for many rows at once: register v of `registers` holds variable v of every row. Every
+    /// operation runs over all rows before the next, and gives each the same bits as [`Program::eval`]. Returns the
+    /// register of each output.
+    pub fn eval_lanes(&self, registers: &mut Vec<Lanes>) -> impl ExactSizeIterator<Item = usize> + '_ {
+        self.eval_rows(registers, LANES)
+    }
+
+    /// The same for the first `rows` only; the other lanes have no meaning afterwards.
+    pub fn eval_rows(
+        &self,
+        registers: &mut Vec<Lanes>,
+        rows: usize,
+    ) -> impl ExactSizeIterator<Item = usize> + '_ {
+        if registers.len() < self.registers {
+            registers.resize(self.registers, [0.0; LANES]);
+        }
+        // Loops of a length that is known when this is compiled take two thirds of the instructions.
+        match rows.div_ceil(PART) {
+            0 | 1 => self.run::<1>(registers, rows),
+            2 => self.run::<2>(registers, rows),
+            _ => self.run::<{ LANES / PART }>(registers, rows),
+        }
+        self.outputs.iter().map(|&register| register as usize)
+    }
+
+    /// Carries out all instructions for so many parts of the lanes, of which `rows` lanes count.
+    fn run<const PARTS: usize>(&self, registers: &mut [Lanes], rows: usize) {
+        for instruction in &self.code {
+            match *instruction {
+                Instruction::Const(to, x) => each::<PARTS>(registers, [to, to, to], |_, _| x),
+                Instruction::Unary(Unary::Neg, to, a) => each::<PARTS>(registers, [to, a, a], |x, _| -x),
+                Instruction::Unary(Unary::Square, to, a) => {
+                    each::<PARTS>(registers, [to, a, a], |x, _| x * x)
+                }
+                Instruction::Binary(Binary::Add, to, a, b) => {
+                    each::<PARTS>(registers, [to, a, b], |x, y| x + y)
+                }
+                Instruction::Binary(Binary::Sub, to, a, b) => {
+                    each::<PARTS>(registers, [to, a, b], |x, y| x - y)
+                }
+                Instruction::Binary(Binary::Mul, to, a, b) => {
+                    each::<PARTS>(registers, [to, a, b], |x, y| x * y)
+                }
+                Instruction::Binary(Binary::Div, to, a, b) => {
+                    each::<PARTS>(registers, [to, a, b], |x, y| x / y)
+                }
+                Instruction::Left(Binary::Add, to, x, b) => {
+                    each::<PARTS>(registers, [to, b, b], |y, _| x + y)
+                }
+                Instruction::Left(Binary::Sub, to, x, b) => {
+                    each::<PARTS>(registers, [to, b, b], |y, _| x - y)
+                }
+                Instruction::Left(Binary::Mul, to, x, b) => {
+                    each::<PARTS>(registers, [to, b, b], |y, _| x * y)
+                }
+                Instruction::Left(Binary::Div, to, x, b) => {
+                    each::<PARTS>(registers, [to, b, b], |y, _| x / y)
+                }
+                Instruction::Right(Binary::Add, to, a, y) => {
+                    each::<PARTS>(registers, [to, a, a], |x, _| x + y)
+                }
+                Instruction::Right(Binary::Sub, to, a, y) => {
+                    each::<PARTS>(registers, [to, a, a], |x, _| x - y)
+                }
+                Instruction::Right(Binary::Mul, to, a, y) => {
+                    each::<PARTS>(registers, [to, a, a], |x, _| x * y)
+                }
+                Instruction::Right(Binary::Div, to, a, y) => {
+                    each::<PARTS>(registers, [to, a, a], |x, _| x / y)
+                }
+                Instruction::Product(Binary::Add, to, a, [b, c]) => {
+                    each_of_three::<PARTS>(registers, [to, a, b, c], |x, y, z| x + y * z)
+                }
+                Instruction::Product(_, to, a, [b, c]) => {
+                    each_of_three::<PARTS>(registers, [to, a, b, c], |x, y, z| x - y * z)
+                }
+                Instruction::Squared(Binary::Add, to, a, b) => {
+                    each::<PARTS>(registers, [to, a, b], |x, y| x + y * y)
+                }
+                Instruction::Squared(_, to, a, b) => each::<PARTS>(registers, [to, a, b], |x, y| x - y * y),
+                Instruction::Scaled(Binary::Add, to, a, z, b) => {
+                    each::<PARTS>(registers, [to, a, b], |x, y| x + z * y)
+                }
+                Instruction::Scaled(_, to, a, z, b) => each::<PARTS>(registers, [to, a, b], |x, y| x - z * y),
+                _ => self.carry_out(*instruction, registers, rows),
+            }
+        }
+    }
+
+    /// Carries out an instruction that is more than arithmetic, row by row.
+    fn carry_out(&self, instruction: Instruction, registers: &mut [Lanes], rows: usize) {
+        match instruction {
+            Instruction::Const(to, x) => each_of(registers, rows, [to, to, to], &mut |_, _| x),
+            Instruction::Unary(op, to, a) => {
+                each_of(registers, rows, [to, a, a], &mut |x, _| f64::unary(op, x))
+            }
+            Instruction::Binary(op, to, a, b) => {
+                each_of(registers, rows, [to, a, b], &mut |x, y| f64::binary(op, x, y));
+            }
+            Instruction::Left(op, to, x, b) => {
+                each_of(registers, rows, [to, b, b], &mut |y, _| f64::binary(op, x, y));
+            }
+            Instruction::Right(op, to, a, y) => {
+                each_of(registers, rows, [to, a, a], &mut |x, _| f64::binary(op, x, y));
+            }
+            Instruction::Product(..) | Instruction::Squared(..) | Instruction::Scaled(..) => {
+                unreachable!("they are arithmetic")
+            }
+            Instruction::Select(to, c, a, b) => {
+                let (c, a, b) = (registers[c as usize], registers[a as usize], registers[b as usize]);
+                registers[to as usize] = std::array::from_fn(|i| f64::select(c[i], a[i], b[i]));
+            }
+            Instruction::Curve(curve, part, to, a) => {
+                let curve = &self.curves[curve as usize];
+                each_of(registers, rows, [to, a, a], &mut |x, _| curve.eval(part, x));
+            }
+            Instruction::Piece(curve, part, to, i, a) => {
+                let curve = &self.curves[curve as usize];
+                each_of(registers, rows, [to, i, a], &mut |i, x| curve.continued(part, i, x));
+            }
+            Instruction::Element(array, to, i) => {
+                let array = &self.arrays[array as usize];
+                each_of(registers, rows, [to, i, i], &mut |i, _| array.element(i));
+            }
+            Instruction::Field(field, part, to, at) => {
+                let (field, at) = (&self.fields[field as usize], at.map(|of| registers[of as usize]));
+                let value = |i: usize| field.value(part, [at[0][i], at[1][i], at[2][i], at[3][i]]);
+                registers[to as usize] = std::array::from_fn(|i| if i < rows { value(i) } else { f64::NAN });
+            }
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Stretches on which nothing happens: a test of few operations, which most stretches of coupled modules pass, in place of
+//! a search.
+//!
+//! It asks less of each atom than a search of the same stretch does, so a search would find nothing either: a formula meets
+//! its level after the end, or never; the hull of a parameter's dense output, from here to the end and not piece by piece,
+//! keeps clear of the level by the margin that a search asks for. All else is left to the search.
+
+use super::crossing::{LocationMethod, is_clear_of, is_unreachable, level_of_dense, location_method};
+use super::signs::{Reach, reach};
+use crate::trajectory::Trajectory;
+use crate::world::World;
+use crate::world::coupled_solution::CoupledSolution;
+use crate::world::state::State;
+use dlsys_expr::Program;
+use dlsys_model::{Rule, Sign, ZeroCrossing};
+use dlsys_tree::SimTime;
+
+/// An instant counts as later than another if it is so by this many times the resolution of time.
+const LATER: f64 = 64.0;
+
+/// A coupled module from an instant to the end of the common step.
+pub struct Outlook<'w> {
+    pub world: &'w World,
+    pub solution: &'w CoupledSolution,
+    pub state: &'w State,
+    pub rule: &'w Rule,
+    pub from: SimTime,
+}
+
+impl Outlook<'_> {
+    /// True if it is plain that no atom changes its sign before the end, nor comes near to it.
+    pub fn is_quiet(&self) -> bool {
+        let Outlook { state, rule, .. } = self;
+        if self.solution.error <= 0.0 || state.next.near != 0 || !state.next.changes.is_empty() {
+            return false;
+        }
+        rule.zero_crossings(state.solve).iter().enumerate().all(|(atom, crossing)| {
+            is_unreachable(rule, state, atom)
+                || match location_method(crossing, state) {
+                    LocationMethod::Never => true,
+                    LocationMethod::Formula(variable, level) => {
+                        self.is_met_later(variable, level, state.signs[atom])
+                    }
+                    LocationMethod::Search => self.keeps_clear(crossing, state.signs[atom]),
+                }
+        })
+    }
+
+    /// True if a variable with a formula meets its level after the end, or never.
+    fn is_met_later(&self, variable: usize, level: &Program, sign: Sign) -> bool {
+        if !matches!(sign, Sign::Plus | Sign::Minus) {
+            // Such a sign is not tracked along a formula.
+            return true;
+        }
+        let Some(&[level]) = level.constants() else { return false };
+        let trajectory = self.state.trajectories.get(variable);
+        let start = trajectory.map_or(0.0, |_| self.world.tree.parameters(self.state.id)[variable]);
+        // Near an equilibrium the rate has to be computed from the equation as written: that is for the search.
+        let mut is_known = true;
+        let exact = || {
+            is_known = false;
+            f64::NAN
+        };
+        let met = match reach(variable, self.rule.time_variable(), level, trajectory, start, exact) {
+            Some(Reach::At(time)) => time,
+            Some(Reach::Age(age)) => self.world.tree.birth(self.state.id).after(age),
+            Some(Reach::After(tau)) => self.state.since.after(tau),
+            None => return is_known,
+        };
+        let end = self.solution.end;
+        met.since(end) > LATER * end.resolution()
+    }
+
+    /// True if an integrated parameter keeps clear of the one level at which its atom's sides meet.
+    fn keeps_clear(&self, crossing: &ZeroCrossing, sign: Sign) -> bool {
+        let level = |level: &Program| level.constants().map(|all| all[0]);
+        let Some((variable, level, side)) = level_of_dense(crossing, sign, level) else { return false };
+        let bounds = self.state.trajectories.get(variable).and_then(|trajectory| match trajectory {
+            Trajectory::Coupled(component) => self.solution.hull(*component as usize, self.from),
+            _ => None,
+        });
+        bounds.is_some_and(|bounds| is_clear_of(bounds, level, side, self.solution.error))
+    }
+}
