@@ -92,8 +92,8 @@ mod tests {
             ("const a=2if b<1 then 1e2e3 else 3.5(b)", "const a = 2if b < 1 then 1e2e3 else 3.5(b)"),
             ("def f( x,y )=if x<=y&!(x=0)then x else-y", "def f(x, y) = if x <= y & !(x = 0) then x else -y"),
             (
-                "def step( p )=p*2\nframes 0..9 step 2*step (1)+step(2)",
-                "def step(p) = p*2\nframes 0 .. 9 step 2*step (1) + step(2)",
+                "def step( p )=p*2\nframes 0..9 step 2*step(1)+step(2)",
+                "def step(p) = p*2\nframes 0 .. 9 step 2*step(1) + step(2)",
             ),
             ("frames 0..9 step .5", ""),
             ("frames 0..9 step 0.5", "frames 0 .. 9 step 0.5"),
