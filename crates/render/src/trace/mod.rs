@@ -17,6 +17,7 @@ mod contour;
 mod hidden;
 mod label;
 mod memory;
+mod path;
 mod regions;
 mod tones;
 
@@ -27,7 +28,6 @@ use std::fmt::Write;
 use super::Fit;
 use super::formats::png::Lit;
 use super::name::Names;
-use super::number;
 use super::painter::Style;
 use super::stroke::{Stroke, Strokes, is_thin, pixels_across};
 use super::triangles::{Solid, Triangles};
@@ -38,6 +38,7 @@ use hidden::Visible;
 use label::{Look, Stems};
 pub(super) use memory::Memory;
 use memory::Rasters;
+use path::push_outline;
 use regions::Regions;
 use tones::Tones;
 
@@ -199,42 +200,6 @@ fn stems(scene: &Scene, style: Style, visible: &Visible, is_declared: bool) -> S
     let gradients = (0..).zip(&scene.segments).filter(|(_, segment)| has_gradient(segment));
     let gradients = gradients.map(|(i, _)| i).collect();
     Stems { strokes, gradients }
-}
-
-/// Appends a closed outline to path data, in relative coordinates of so many decimals.
-fn push_outline(
-    data: &mut String,
-    outline: &[Corner],
-    to_page: impl Fn(Corner) -> [f64; 2],
-    decimals: usize,
-) {
-    let scale = 10_f64.powi(decimals as i32);
-    let mut last: Option<[f64; 2]> = None;
-    for corner in outline {
-        let at = to_page(*corner).map(|x| (x * scale).round());
-        let [x, y] = last.map_or(at, |last| [at[0] - last[0], at[1] - last[1]]);
-        if last.is_some() && x == 0.0 && y == 0.0 {
-            continue;
-        }
-        data.push(if last.is_none() { 'M' } else { 'l' });
-        push_number(data, x / scale, decimals, false);
-        push_number(data, y / scale, decimals, true);
-        last = Some(at);
-    }
-    data.push('z');
-}
-
-/// Appends a number of path data, as short as it can be; `after` another one.
-fn push_number(data: &mut String, x: f64, decimals: usize, after: bool) {
-    let start = data.len();
-    number::push(data, x, decimals);
-    if data[start..].starts_with("0.") {
-        data.remove(start);
-    }
-    // A sign separates, too.
-    if after && !data[start..].starts_with('-') {
-        data.insert(start, ' ');
-    }
 }
 
 /// Writes the elements.
