@@ -139,12 +139,24 @@ impl Simplex {
     }
 }
 
-/// The corner that is first along a direction, by the lower value; of equal ones, the first.
-fn foremost(points: &[Vector], direction: &Vector) -> usize {
+/// The point that is lowest along a direction; of equal ones, the first. Numbers have the total order, in which -0 is below 0.
+fn lowest(points: &[Vector], direction: &Vector) -> usize {
     let mut best = (0, f64::INFINITY);
     for (index, point) in points.iter().enumerate() {
         let along = point.dot(direction);
-        if along < best.1 {
+        if along.total_cmp(&best.1).is_lt() {
+            best = (index, along);
+        }
+    }
+    best.0
+}
+
+/// The point that is highest along a direction; of equal ones, the last.
+fn highest(points: &[Vector], direction: &Vector) -> usize {
+    let mut best = (0, f64::NEG_INFINITY);
+    for (index, point) in points.iter().enumerate() {
+        let along = point.dot(direction);
+        if along.total_cmp(&best.1).is_ge() {
             best = (index, along);
         }
     }
@@ -155,8 +167,8 @@ fn foremost(points: &[Vector], direction: &Vector) -> usize {
 /// limit. The first hull has a corner.
 fn approach(first: &[Vector], second: &[Vector], limit: f64) -> (Vector, Simplex, bool) {
     let difference = |direction: Vector| {
-        let index = foremost(first, &direction);
-        let other = second.get(foremost(second, &-direction));
+        let index = lowest(first, &direction);
+        let other = second.get(highest(second, &direction));
         Corner { place: first[index] - other.copied().unwrap_or_else(Vector::zeros), index }
     };
     let begin = difference(Vector::zeros());
