@@ -127,6 +127,27 @@ fn pulses_of_any_width_are_seen_wherever_they_are() {
     }
 }
 
+/// A pulse in a value that a neighbour reads. Dense output has stages of its own: one that meets the pulse shows some of it, though no error depends on that.
+#[test]
+fn pulses_of_values_that_neighbours_read_are_seen_between_the_stages_that_count() {
+    for n in 0..120 {
+        let at = 0.3 + (n as f64 * 0.317) % 1.4;
+        let text = format!(
+            "initial string: C(0.18, 0) C(0.37, 0) C(0.45, 0) C(0.92, 0) C(1.16, 0)\n\
+             C(l, w) < C(x, v): solve v = exp(-((t - {at:?})/0.01)^2)*x, dx/dt = w - x + 1.23*x/(0.62 + x) - 0.62*x\n\
+             C(x, v): solve v = x, dx/dt = 0.75 - x"
+        );
+        let end = |method, tolerance| {
+            let settings = Settings { method, tolerance, ..Settings::default() };
+            run(&text, settings, &[2.0]).unwrap_or_else(|e| panic!("{e}\n{text}")).remove(0)
+        };
+        let (found, reference) = (end(Method::Auto, 1e-6), end(Method::Dopri5, 1e-9));
+        for (found, reference) in found.iter().zip(&reference) {
+            assert!((found.1[0] - reference.1[0]).abs() < 1e-4, "{found:?} {reference:?}\n{text}");
+        }
+    }
+}
+
 #[test]
 fn pulses_along_integrated_values_are_seen_in_stiff_equations() {
     // x is 1/sqrt(1 + t), y and w follow it at once. A pulse of area 1 along one of them is over in a time of 30 to 0.003 parts of a thousand.

@@ -128,19 +128,27 @@ impl PulseDetector {
                 return PulseFinding::Clear;
             }
         }
-        self.sample(step, rates, all);
         let values = &step.solve.algebraic.values;
         let explicit = values.outputs() > 0 && step.solve.algebraic.explicit.iter().all(|e| *e);
+        let mut sampled = Vec::new();
+        if explicit {
+            self.sample(step, values, all);
+            sampled.clone_from(&self.seen);
+        }
+        self.sample(step, rates, all);
         along(step, |path, part| {
             let finding = self.compare(path, rates, all * part, part, step);
             if !explicit || finding != PulseFinding::Clear {
                 return finding;
             }
-            // Bounds of the explicit values are compared with the dense output of these values.
+            // Bounds of the explicit values are compared with the dense output of these values, which others read, and with the values at the stages: dense
+            // output has stages of its own, on which no error depends.
             let rates = std::mem::take(&mut self.seen);
-            let of = step.solve.algebraic.of.iter();
-            self.seen =
-                of.map(|p| path.dense_bounds(*p).map_or(f64::INFINITY, Interval::magnitude)).collect();
+            let of = step.solve.algebraic.of.iter().zip(&sampled);
+            let seen = |(p, at_stages): (&usize, &f64)| {
+                path.dense_bounds(*p).map_or(f64::INFINITY, |bounds| bounds.magnitude().min(*at_stages))
+            };
+            self.seen = of.map(seen).collect();
             let finding = self.compare(path, values, 1.0, part, step);
             self.seen = rates;
             finding
