@@ -63,7 +63,9 @@ fn numbers(value: &str) -> (Vec<f64>, String) {
     };
     let mut number = String::new();
     for c in value.chars().chain([' ']) {
-        if !(number.is_empty() || c.is_ascii_digit() || c == '.') {
+        // A second point begins another number.
+        let goes_on = c.is_ascii_digit() || c == '.' && !number.contains('.');
+        if !(number.is_empty() || goes_on) {
             // As in `stop-color`.
             match number.as_str() {
                 "-" => rest.push('-'),
