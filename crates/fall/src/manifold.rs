@@ -97,7 +97,7 @@ impl Manifold<'_> {
                 continue;
             }
             let normal = way / distance;
-            if relief.is_outward(&(point - way), &normal, self.relief.fold()) {
+            if relief.is_outward(&(point - way), &normal, relief.fold()) {
                 self.push(part, (point, normal), distance);
             }
         }
@@ -223,7 +223,7 @@ fn stretch<'a>(
         (point, way.dot(&along) / length, way.dot(&across))
     });
     let placed: Vec<(&Vector, f64, f64)> = placed.collect();
-    let mut ends: [Option<(Vector, f64)>; 2] = [None, None];
+    let mut ends: [Option<Vector>; 2] = [None, None];
     let mut shares = [f64::INFINITY, f64::NEG_INFINITY];
     for (p, at_p, left) in placed.iter().filter(|(.., aside)| *aside >= 0.0) {
         for (q, at_q, right) in placed.iter().filter(|(.., aside)| *aside <= 0.0) {
@@ -232,12 +232,12 @@ fn stretch<'a>(
             let (share, place) = (at_p + (at_q - at_p) * part, *p + (*q - *p) * part);
             for (end, is_further) in [(0, share < shares[0]), (1, share > shares[1])] {
                 if is_further {
-                    (shares[end], ends[end]) = (share, Some((place, 0.0)));
+                    (shares[end], ends[end]) = (share, Some(place));
                 }
             }
         }
     }
-    let [Some((first, _)), Some((last, _))] = ends else { return [None, None] };
+    let [Some(first), Some(last)] = ends else { return [None, None] };
     if shares[0] >= 1.0 || shares[1] <= 0.0 {
         return [None, None];
     }
