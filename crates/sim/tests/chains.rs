@@ -202,6 +202,20 @@ fn most_productions_of_plain_lives_are_in_chains() {
     }
 }
 
+/// Modules with the same values end at many instants. The time since birth, which their values at the end hang on, is rounded there in more
+/// ways than one: no successor may be taken from a twin of another instant unless it is the same. Here one of a hundred and twenty lives was,
+/// by the queue, so that a value depended in its last bit on the frames that were asked for.
+#[test]
+fn twins_of_other_instants_give_no_other_bits() {
+    let a = Kind { heirs: [1; 2], ..lives(1, 4, 1) };
+    let b = Kind { rate: 0, ..lives(6, 2, 0) };
+    let c = Kind { heirs: [1; 2], ..lives(3, 1, 1) };
+    let times: Vec<f64> = (1..=7).map(|k| 20.0 * f64::from(k) / 7.0).collect();
+    for times in [&times[..], &times[2..], &times[6..]] {
+        compare(&text(68, 0.25, &[a.clone(), b.clone(), c.clone()]), Settings::default(), times, &[1]);
+    }
+}
+
 #[test]
 fn an_error_is_found_where_the_queue_finds_it() {
     // One of them divides by zero at the end of its sixth life.

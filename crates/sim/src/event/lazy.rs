@@ -160,7 +160,10 @@ impl EventStage<'_, '_> {
             let child = self.child(kind, own);
             life.children.push(child);
         }
-        life.lasting = self.world.lives.is_lasting(rule, produce) && life.children.iter().all(|c| c.lasting);
+        // The values at the end are those after the rounded time since birth, which is not the same at all instants.
+        let is_exact = life.tau == Some(self.instant.at.since(life.birth));
+        let same_successor = is_exact && self.world.lives.is_lasting(rule, produce);
+        life.lasting = same_successor && life.children.iter().all(|child| child.lasting);
         Ok(())
     }
 
