@@ -28,17 +28,27 @@ const FIVE_STAGES_BELOW: f64 = 1e-5;
 pub struct Radau {
     /// None before the first step.
     stages: Option<Stages>,
-    /// The structure of the Jacobian, and the place of each partial derivative in it.
-    pattern: Option<(Pattern, Vec<usize>)>,
+    pattern: Option<Structure>,
+    /// The partial derivatives as they were last evaluated; none before that.
+    partials: Vec<f64>,
     scale: Vec<f64>,
+    blur: Vec<f64>,
     coefficients: Vec<f64>,
+}
+
+/// The structure of the Jacobian: of each partial derivative, row and column, and its place.
+#[derive(Clone)]
+struct Structure {
+    pattern: Pattern,
+    couplings: Vec<(u32, u32)>,
+    places: Vec<usize>,
 }
 
 /// A system whose partial derivatives are put into their places.
 struct Placed<'a, R> {
     system: &'a mut R,
     places: &'a [usize],
-    values: Vec<f64>,
+    values: &'a mut Vec<f64>,
     evaluations: u64,
 }
 
@@ -49,10 +59,30 @@ impl<R: Rates> Stiff for Placed<'_, R> {
     }
 
     fn jacobian(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
-        self.system.partials(tau, y, &mut self.values);
-        for (&place, value) in self.places.iter().zip(&self.values) {
+        self.system.partials(tau, y, self.values);
+        for (&place, value) in self.places.iter().zip(&*self.values) {
             out[place] += value;
         }
+    }
+}
+
+/// How far rounding of the state moves each component in a step, by the partial derivatives that are known: a component that decays at the
+/// rate d forgets it in the time 1/d. What has come to rest where its rate is a difference of large terms is no better known, and a
+/// step that knew it better would be of no length.
+fn blur(couplings: &[(u32, u32)], partials: &[f64], y: &[f64], h: f64, out: &mut Vec<f64>) {
+    /// Roundings of a rate, in units of that of its largest term.
+    const ROUNDINGS: f64 = 4.0;
+    out.clear();
+    out.resize(y.len(), 0.0);
+    for (&(row, column), slope) in couplings.iter().zip(partials) {
+        let noise = (slope * y[column as usize]).abs();
+        out[row as usize] += if noise.is_finite() { noise } else { 0.0 };
+    }
+    for noise in &mut *out {
+        *noise *= ROUNDINGS * f64::EPSILON * h.abs();
+    }
+    for (&(row, _), slope) in couplings.iter().zip(partials).filter(|((row, column), _)| row == column) {
+        out[row as usize] /= 1.0 + (h * slope).abs();
     }
 }
 
@@ -69,6 +99,7 @@ impl OneStep for Radau {
 
     fn forget(&mut self) {
         self.pattern = None;
+        self.partials.clear();
         if let Some(stages) = &mut self.stages {
             stages.forget();
         }
@@ -105,18 +136,22 @@ impl OneStep for Radau {
         let scale = |(y, f): (&f64, &f64)| tolerance * (y.abs().max((h * f).abs().min(largest)) + FLOOR);
         self.scale.extend(y.iter().zip(rate).map(scale));
         let Some(stages) = &mut self.stages else { return Trial::Diverged };
-        let (pattern, places) = match &mut self.pattern {
+        let Structure { pattern, couplings, places } = match &mut self.pattern {
             Some(known) => known,
             unknown => {
                 let couplings = system.couplings();
                 let Some(pattern) = Pattern::new(y.len(), &couplings) else { return Trial::Diverged };
                 let place = |&(row, column): &(u32, u32)| pattern.entry(row as usize, column as usize);
                 let places = couplings.iter().filter_map(place).collect();
-                unknown.insert((pattern, places))
+                unknown.insert(Structure { pattern, couplings, places })
             }
         };
+        blur(couplings, &self.partials, y, h, &mut self.blur);
+        for (scale, blur) in self.scale.iter_mut().zip(&self.blur) {
+            *scale = scale.max(*blur);
+        }
         let modules = system.modules();
-        let mut placed = Placed { system, places, values: Vec::new(), evaluations: 0 };
+        let mut placed = Placed { system, places, values: &mut self.partials, evaluations: 0 };
         let start = Start { pattern, y, rate, scale: &self.scale };
         let attempt = stages.attempt(&mut placed, &start, h);
         work.evaluations += placed.evaluations * modules;
