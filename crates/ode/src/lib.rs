@@ -23,6 +23,7 @@ mod methods;
 mod one_step;
 mod rates;
 mod roots;
+mod share;
 mod sparse;
 mod stepper;
 mod workspace;

@@ -82,6 +82,7 @@ mod scratch;
 mod settings;
 mod setup;
 mod surroundings;
+mod threads;
 mod trajectory;
 mod world;
 

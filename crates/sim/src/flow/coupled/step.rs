@@ -32,6 +32,10 @@ const MAX_CUTS: u32 = 2;
 /// The part of a common step's length that is tried where too many members would have to be integrated again.
 const SHORTER: f64 = 0.25;
 
+/// A common step of so many components, in units of [`Settings::threads_from`](crate::Settings::threads_from), is shared by threads: they begin anew for
+/// each stage.
+const LARGE: usize = 4;
+
 /// A common step: its end, and its dense output if that has been computed.
 type CommonStep = (Result<SimTime, StepError>, Option<CoupledSolution>);
 
@@ -136,7 +140,11 @@ impl FlowStage<'_, '_> {
         integrator.set_unwatched(is_unwatched);
         if linear.is_none() {
             system.prepare_rates(rules);
-            integrator.restart(self.setup.settings.method, y.len());
+            let settings = &self.setup.settings;
+            let threads = if y.len() < LARGE * settings.threads_from { 1 } else { settings.threads };
+            system.lanes.share(threads);
+            integrator.set_threads(threads);
+            integrator.restart(settings.method, y.len());
         }
     }
 
