@@ -57,6 +57,16 @@ fn the_shadow_of_a_pole_lies_on_the_side_away_from_the_sun_and_is_as_long_as_it_
     assert!(floor(-4.3, 0.0) > 0.9 * lit, "beyond the shadow's end");
 }
 
+/// A drawing in one plane is a diagram until the model declares light: then it is round stems and shadows as any other.
+#[test]
+fn what_has_no_depth_stands_in_declared_light() {
+    let mut flat = scene("!(0.2)F(4)");
+    let side = |scene: &Scene, x: f64| seen_at(scene, "0,0", Point::new(x, 2.0, 0.0))[1];
+    assert_eq!(side(&flat, -0.07), side(&flat, 0.07), "a diagram has one shade");
+    flat.surroundings.sun = Some(Vector::new(-1.0, 1.0, 0.2));
+    assert!(side(&flat, -0.07) > 1.2 * side(&flat, 0.07), "a side towards the sun, and one away from it");
+}
+
 /// Ground of soil that reaches a hundred times as far does not make the shadow of what stands on it wider.
 #[test]
 fn shadows_on_wide_soil_are_as_sharp_as_on_a_floor() {

@@ -33,6 +33,8 @@ pub struct Survey {
     turns: bool,
     /// There are pictures on surfaces, or ground that gives way: these are seen as they are also where plants have no depth, or nothing is drawn.
     has_solids: bool,
+    /// A sun, a sky or a floor is declared: what has no depth is no diagram then, but stands in that light.
+    is_lit: bool,
     /// The surroundings of the first frame.
     first: Option<Surroundings>,
 }
@@ -53,6 +55,7 @@ impl Survey {
             has_camera: false,
             turns: false,
             has_solids: false,
+            is_lit: false,
             first: None,
         }
     }
@@ -96,6 +99,7 @@ impl Survey {
         self.first.get_or_insert_with(|| around.clone());
         self.has_camera |= around.camera.is_some() && self.follows_cameras;
         self.seen.merge(&if self.turns { Extent::profile(scene) } else { Extent::of(scene, &self.view) });
+        self.is_lit |= around.sun.is_some() || around.sky.is_some() || around.floor.is_some();
         self.has_solids |= scene.palette.has_textures() || scene.terrain.is_some();
         self.crowd.merge(Crowd::of(scene));
     }
@@ -106,6 +110,7 @@ impl Survey {
         self.crowd.merge(other.crowd);
         self.has_camera |= other.has_camera;
         self.has_solids |= other.has_solids;
+        self.is_lit |= other.is_lit;
         if self.first.is_none() {
             self.first.clone_from(&other.first);
         }
@@ -157,10 +162,10 @@ impl Survey {
                 true => Picture::of([-0.5 * CAMERA_SHAPE, -0.5, CAMERA_SHAPE, 1.0]),
                 false => Picture::around(shadow.map(|shadow| camera.frame(&shadow))).magnified(self.zoom),
             },
-            light: Light::new(depths, extent),
+            light: Light::new(depths, extent, self.is_lit),
             meshes: (usual, self.space.corners(usual)),
             has_one_width: self.has_one_width,
-            has_regions: depths[1] - depths[0] > FLAT * extent || self.has_solids,
+            has_regions: depths[1] - depths[0] > FLAT * extent || self.has_solids || self.is_lit,
             declared: self.declared.clone(),
             zoom: self.zoom,
             follows_cameras: self.follows_cameras,
@@ -191,7 +196,7 @@ pub struct Fit {
     meshes: (f64, Option<[Point; 2]>),
     /// All lines have the default width.
     has_one_width: bool,
-    /// Its depth is more than rounding, or there are pictures on surfaces or ground that gives way.
+    /// Its depth is more than rounding, or there are pictures on surfaces, ground that gives way, or declared light.
     has_regions: bool,
     declared: Surroundings,
     zoom: f64,
@@ -270,13 +275,13 @@ impl Fit {
         Bounds::of(&self.drawn(Cow::Borrowed(scene))).corners(self.default_width)
     }
 
-    /// True if SVG pictures are made of visible regions: the animation has depth, or there are pictures on surfaces or ground that gives way. Without depth nothing is hidden,
+    /// True if SVG pictures are made of visible regions: the animation has depth, or there are pictures on surfaces, ground that gives way, or declared light. Without depth nothing is hidden,
     /// and every element keeps its exact shape.
     pub(super) fn has_visible_regions(&self) -> bool {
         self.has_regions
     }
 
-    /// How stems become tubes. Without depth they are lines of a diagram, and their joints keep their shape.
+    /// How stems become tubes. Without depth and declared light they are lines of a diagram, and their joints keep their shape.
     pub(super) fn tubes(&self) -> TubeStyle {
         let Fit { default_width, accuracy, .. } = *self;
         TubeStyle {

@@ -50,12 +50,14 @@ pub struct Light {
 }
 
 impl Light {
-    /// The light on things between these depths, the greater one nearer; `extent` is the largest side of the whole, in scene units.
-    pub(super) fn new([far, near]: [f64; 2], extent: f64) -> Light {
+    /// The light on things between these depths, the greater one nearer; `extent` is the largest side of the whole, in scene units. Where
+    /// light or a floor `is_declared`, relief is drawn in full.
+    pub(super) fn new([far, near]: [f64; 2], extent: f64, is_declared: bool) -> Light {
         let depth = if extent > 0.0 { ((near - far) / extent).max(0.0) } else { 0.0 };
         let falloff =
             if depth > 0.0 { DISTANCE * (depth / DISTANCE_FROM).min(1.0) / (near - far) } else { 0.0 };
-        Light { relief: (depth / RELIEF_FROM).min(1.0), falloff, near }
+        let relief = if is_declared { 1.0 } else { (depth / RELIEF_FROM).min(1.0) };
+        Light { relief, falloff, near }
     }
 
     /// Whether light makes a difference at all.
@@ -118,7 +120,7 @@ mod tests {
 
     #[test]
     fn flat_drawings_keep_their_colours() {
-        let light = Light::new([0.0, 0.0], 10.0);
+        let light = Light::new([0.0, 0.0], 10.0, false);
         assert!(light.is_flat());
         assert_eq!(light.strength(LAMP, 0.0), 1.0);
         assert_eq!(light.across(Vector::x(), 0.0, [-1.0, 0.0, 1.0]), [1.0; 3]);
@@ -127,7 +129,7 @@ mod tests {
     #[test]
     fn light_comes_from_the_upper_left_and_fades_with_distance() {
         assert!((LAMP.norm() - 1.0).abs() < 1e-9);
-        let light = Light::new([-5.0, 5.0], 10.0);
+        let light = Light::new([-5.0, 5.0], 10.0, false);
         assert_eq!(light.strength(Vector::z(), 5.0), 1.0);
         assert!((light.strength(Vector::z(), -5.0) - 0.84).abs() < 1e-12);
         let lit = |x: f64, y: f64| light.strength(Vector::new(x, y, 0.0), 5.0);

@@ -148,15 +148,21 @@ impl<'s> Tubes<'s> {
                 tubes.profiles.push(Profile::new(spokes));
                 tubes.profiles.len() - 1
             });
-            let (begin, collar) = match style.grown {
-                true => structure.beginning(scene, first, &style),
-                false => (Begin::Dome, None),
+            let fork = structure.fork(first).filter(|_| !style.steady);
+            let (begin, collar) = match (style.grown, fork) {
+                (true, Some(_)) => (Begin::Flat, None),
+                (true, None) => structure.beginning(scene, first, &style),
+                (false, _) => (Begin::Dome, None),
             };
+            members.splice(0..0, fork);
             let radii = &structure.radii;
             let TubeStyle { accuracy, steady, .. } = style;
             let chain = Chain { segments, radii, members: &members, accuracy, steady };
             parts.clear();
             chain.parts(style.grown, collar.as_ref(), &mut parts);
+            if let Some(parent) = fork {
+                chain::begin_within(parent, first, segments[parent].direction, &mut parts);
+            }
             let before = structure.before(segments, first);
             if let Some(&part) = parts.first().filter(|_| style.grown && before > 0.0) {
                 let [start, _] = part.centres;

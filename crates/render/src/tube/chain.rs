@@ -1,7 +1,7 @@
 //! Segments that continue one another, cut into parts: where the width steps, the thinner stem widens smoothly
-//! towards the thicker one; bends are round; and collars need cross-sections of their own.
+//! towards the thicker one, or tapers through a bend; bends are round; and collars need cross-sections of their own.
 //!
-//! Blends and bends depend on places along the stem alone, so they are the same however the stem is divided into segments.
+//! Blends, tapers and bends depend on places along the stem alone, so they are the same however the stem is divided into segments.
 
 use super::collar::{Collar, Station};
 use dlsys_geometry::scene::{Point, Segment, Vector};
@@ -12,12 +12,14 @@ const EQUAL: f64 = 1e-9;
 const LENGTH: f64 = 2.5;
 const LEAST: f64 = 1.2;
 /// Most that a blend adds to the thinner radius, in parts of it; beyond that there is a flat shoulder.
-const MOST: f64 = 1.0;
+pub(super) const MOST: f64 = 1.0;
 
 /// Segments are straight on from one another if the sine of their angle is less.
 const STRAIGHT: f64 = 1e-6;
 /// Radius of a bend, in parts of the stem's radius.
 const ROUNDING: f64 = 2.5;
+/// Pieces of a taper on either side of its bend.
+const TAPER_PIECES: f64 = 3.0;
 
 /// A part of a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +62,8 @@ struct Blend {
 
 /// A place where a stem turns, rounded by a parabola (a quadratic Bézier curve) that begins and ends on its segments.
 struct Bend {
+    /// The member that begins there.
+    member: usize,
     /// Where it is, as a length along the chain, and how far from there it begins and ends.
     at: f64,
     reach: f64,
@@ -67,6 +71,17 @@ struct Bend {
     directions: [Vector; 2],
     /// Number of pieces on either side.
     pieces: f64,
+    /// The width steps there.
+    taper: Option<Taper>,
+}
+
+/// The smooth change of a stem's width where it turns: half before the bend and half after it, so that it does not bulge there.
+#[derive(Clone, Copy)]
+struct Taper {
+    /// What the radius gains.
+    change: f64,
+    /// How far from the bend it begins and ends.
+    reach: f64,
 }
 
 impl Bend {
@@ -80,9 +95,22 @@ impl Bend {
         Some(self.point + (after * (u * u) - before * ((1.0 - u) * (1.0 - u))) * self.reach)
     }
 
+    /// What it adds to the radius of a member at a length along the chain.
+    fn height(&self, member: usize, at: f64) -> f64 {
+        let Some(Taper { change, reach }) = self.taper else { return 0.0 };
+        let u = (0.5 + 0.5 * (at - self.at) / reach).clamp(0.0, 1.0);
+        let part = u * u * (3.0 - 2.0 * u);
+        change * if member < self.member { part } else { part - 1.0 }
+    }
+
     fn stations(&self) -> impl Iterator<Item = f64> + use<> {
-        let (at, step, pieces) = (self.at, self.reach / self.pieces, self.pieces as i32);
-        (-pieces..=pieces).filter(|k| *k != 0).map(move |k| at + step * f64::from(k))
+        let at = self.at;
+        let around = |reach: f64, pieces: f64| {
+            let (step, pieces) = (reach / pieces, pieces as i32);
+            (-pieces..=pieces).filter(|k| *k != 0).map(move |k| at + step * f64::from(k))
+        };
+        let taper = self.taper.map(|taper| around(taper.reach, TAPER_PIECES));
+        around(self.reach, self.pieces).chain(taper.into_iter().flatten())
     }
 }
 
@@ -98,10 +126,29 @@ impl Blend {
     }
 }
 
+/// The length of a blend of this height on a stem of this radius, if it is long enough.
+fn length_of_blend(radius: f64, height: f64) -> f64 {
+    (LENGTH * height).max(LEAST * radius)
+}
+
 /// How far from a bend a stem of this radius begins to turn, if it is long enough on both sides.
 pub(super) fn reach_of_bend(directions: [Vector; 2], radius: f64) -> f64 {
     let half = (directions[0] - directions[1]).norm() / 2.0;
     ROUNDING * radius * half / (1.0 - half * half).max(1e-6).sqrt()
+}
+
+/// Takes from the parts of a chain those of its first segment, `parent`, up to where it begins to turn or to taper into the next one,
+/// `first`: all of it is another tube's. What is left begins a little within that.
+pub(super) fn begin_within(parent: usize, first: usize, along: Vector, parts: &mut Vec<Part>) {
+    /// The part of the other tube's radius.
+    const WITHIN: f64 = 0.97;
+    if parts.first().is_some_and(|part| part.segment == parent && part.direction == along) {
+        parts.remove(0);
+    }
+    parts.iter_mut().take_while(|part| part.segment == parent).for_each(|part| part.segment = first);
+    if let Some(part) = parts.first_mut() {
+        part.radii[0] *= WITHIN;
+    }
 }
 
 impl Chain<'_> {
@@ -123,8 +170,8 @@ impl Chain<'_> {
             *sum += (self.segments[i].end - self.segments[i].start).norm();
             Some(*sum)
         }));
-        let blends = self.blends(&steps, &arcs);
-        let bends = if bends { self.bends(&steps, &blends, &arcs) } else { Vec::new() };
+        let bends = if bends { self.bends(&steps, &arcs) } else { Vec::new() };
+        let blends = self.blends(&steps, &bends, &arcs);
         let plain = |at| Station { at, drape: 0.0 };
         let mut stations: Vec<Station> =
             blends.iter().flat_map(|blend| self.stations(blend)).map(plain).collect();
@@ -146,7 +193,11 @@ impl Chain<'_> {
                 // Blends do not overlap; of one place the rounding of lengths may count either neighbour as next.
                 let next = blends.partition_point(|blend| blend.at <= at);
                 let near = &blends[next.saturating_sub(2)..blends.len().min(next + 2)];
-                plain + near.iter().map(|blend| blend.height(member, at)).sum::<f64>()
+                let blended = near.iter().map(|blend| blend.height(member, at)).sum::<f64>();
+                // Nor do tapers.
+                let next = bends.partition_point(|bend| bend.member <= member);
+                let near = &bends[next.saturating_sub(1)..bends.len().min(next + 1)];
+                plain + blended + near.iter().map(|bend| bend.height(member, at)).sum::<f64>()
             };
             let mut centre = |part: f64| {
                 let at = first + length * part;
@@ -217,17 +268,16 @@ impl Chain<'_> {
     }
 
     /// The bends that are rounded, in order.
-    fn bends(&self, steps: &[usize], blends: &[Blend], arcs: &[f64]) -> Vec<Bend> {
+    fn bends(&self, steps: &[usize], arcs: &[f64]) -> Vec<Bend> {
         let turns: Vec<usize> = (1..self.members.len()).filter(|&i| self.turns(i)).collect();
         let bound = |k: Option<usize>, end: usize| arcs[k.map_or(end, |k| turns[k])];
         let mut bends = Vec::new();
         for (k, &i) in turns.iter().enumerate() {
             let (a, b) = self.radii_at(i);
+            let (thin, thick) = (a.min(b), a.max(b));
+            let steps = steps.binary_search(&i).is_ok();
             // A shoulder stays as it is.
-            let blend = blends.binary_search_by_key(&i, |blend| blend.member);
-            let blended = blend.is_ok_and(|at| blends[at].height >= (a - b).abs());
-            let shoulder = steps.binary_search(&i).is_ok() && !blended;
-            if shoulder || !self.needs_rounding(i) {
+            if steps && thick - thin > MOST * thin || !self.needs_rounding(i) {
                 continue;
             }
             let back = arcs[i] - bound(k.checked_sub(1), 0);
@@ -238,12 +288,17 @@ impl Chain<'_> {
             let point = self.segments[self.members[i]].start;
             // A piece turns by 8 degrees at most.
             let pieces = (half.asin().to_degrees() / 8.0).ceil().max(1.0);
-            bends.push(Bend { at: arcs[i], reach, point, directions, pieces });
+            let taper = (steps && thick - thin > self.accuracy).then(|| {
+                let long = reach.max(0.5 * length_of_blend(thin, thick - thin));
+                Taper { change: b - a, reach: long.min(0.5 * back).min(0.5 * on) }
+            });
+            bends.push(Bend { member: i, at: arcs[i], reach, point, directions, pieces, taper });
         }
         bends
     }
 
-    fn blends(&self, steps: &[usize], arcs: &[f64]) -> Vec<Blend> {
+    /// The blends where the stem goes straight on.
+    fn blends(&self, steps: &[usize], bends: &[Bend], arcs: &[f64]) -> Vec<Blend> {
         let count = self.members.len();
         let blend = |k: usize| {
             let member = steps[k];
@@ -257,11 +312,16 @@ impl Chain<'_> {
                 true => arcs[steps.get(k + 1).copied().unwrap_or(count)] - arcs[member],
                 false => arcs[member] - arcs[if k > 0 { steps[k - 1] } else { 0 }],
             };
-            let length = (LENGTH * height).max(LEAST * thin).min(0.5 * bound);
+            let length = length_of_blend(thin, height).min(0.5 * bound);
             let smooth = (2.0 - (thick - thin) / (MOST * thin)).clamp(0.0, 1.0);
             Blend { at: arcs[member], member, forwards, height, length, smooth }
         };
+        let tapers = |step: usize| {
+            let bend = bends.binary_search_by_key(&step, |bend| bend.member);
+            bend.is_ok_and(|at| bends[at].taper.is_some())
+        };
         (0..steps.len())
+            .filter(|k| !tapers(steps[*k]))
             .map(blend)
             .filter(|blend| blend.height > self.accuracy && blend.length > 0.0)
             .collect()

@@ -3,9 +3,21 @@
 use super::{Begin, Collar, NONE, TubeStyle, can_join, chain};
 use dlsys_geometry::scene::{Scene, Segment};
 
-/// A branch is wider than what goes on along the axis, or than the end of an axis, from these ratios on.
+/// A branch is wider than what goes on along the axis from this ratio on.
 const TAKES_OVER: f64 = 1.02;
-const TAKES_THE_END: f64 = 1.001;
+/// A branch goes on from the end of an axis, which narrows to it, from this part of its width on. Two equal branches that share
+/// the cross-section of their stem have 0.71 of its width, three 0.58.
+const GOES_ON: f64 = 0.5;
+/// A branch that is wider than the axis ever was by this ratio is no limb of it.
+const LIMB: f64 = 1.001;
+
+/// Whether two segments can share a ring. In drawings in which joints look `grown`, the thinner one widens to the thicker one, so that there
+/// is no shoulder, unless that is more than twice as thick.
+fn joins([a, b]: [&Segment; 2], radii: [f64; 2], grown: bool) -> bool {
+    let (thin, thick) = (radii[0].min(radii[1]), radii[0].max(radii[1]));
+    let blends = grown && thick <= (1.0 + chain::MOST) * thin;
+    can_join(a, b, if blends { [thick; 2] } else { radii })
+}
 
 /// How segments hang together.
 pub(super) struct Structure {
@@ -17,6 +29,8 @@ pub(super) struct Structure {
     pub(super) continues: Vec<bool>,
     /// The segment that each leaves as a branch does, although it goes on along its axis, or `NONE`; none if that happens nowhere.
     leaves: Vec<usize>,
+    /// The segment at whose end each bends away beside the branch that goes on from there, or `NONE`; none if that happens nowhere.
+    forks: Vec<usize>,
 }
 
 impl Structure {
@@ -41,13 +55,14 @@ impl Structure {
                 && segments[before].contour == segment.contour
                 && radii[before][1] > 0.0
                 && radii[i][0] > 0.0
-                && can_join(&segments[before], segment, [radii[before][1], radii[i][0]])
+                && joins([&segments[before], segment], [radii[before][1], radii[i][0]], grown)
             {
                 next[before] = i;
                 continues[i] = true;
             }
         }
-        let mut structure = Structure { radii, next, ahead, continues, leaves: Vec::new() };
+        let mut structure =
+            Structure { radii, next, ahead, continues, leaves: Vec::new(), forks: Vec::new() };
         if grown {
             structure.give_way(segments, kept);
         }
@@ -55,7 +70,8 @@ impl Structure {
     }
 
     /// Where a branch is wider than what goes on along the axis, the branch is the smooth continuation, and the axis comes out of it in a
-    /// collar. One that is wider than the axis ever was is no limb of it, but an organ.
+    /// collar. Where an axis ends in branches, the widest of them goes on from it. One that is wider than the axis ever was is no
+    /// limb of it, but an organ.
     fn give_way(&mut self, segments: &[Segment], kept: impl Fn(usize) -> bool) {
         let mut widest: Vec<f64> = Vec::with_capacity(segments.len());
         let mut branches: Vec<usize> = vec![NONE; segments.len()];
@@ -68,18 +84,13 @@ impl Structure {
                 branches[parent] = i;
             }
         }
+        let mut ends = Vec::new();
         for (parent, &branch) in branches.iter().enumerate().filter(|(_, branch)| **branch != NONE) {
             let axis = self.ahead[parent];
-            let (end, width) = (self.radii[parent][1], self.radii[branch][0]);
             let on = if axis == NONE { 0.0 } else { self.radii[axis][0] };
-            let is_wider = if on > 0.0 { width > TAKES_OVER * on } else { width > TAKES_THE_END * end };
-            let (from, to) = (&segments[parent], &segments[branch]);
-            if !is_wider
-                || end <= 0.0
-                || width > TAKES_THE_END * widest[parent]
-                || from.contour != to.contour
-                || !can_join(from, to, [end, width])
-            {
+            let gives_way =
+                if on > 0.0 { self.radii[branch][0] > TAKES_OVER * on } else { self.goes_on(parent, branch) };
+            if !gives_way || !self.is_limb(segments, [parent, branch], &widest) {
                 continue;
             }
             if axis != NONE {
@@ -88,7 +99,39 @@ impl Structure {
                 self.continues[axis] = false;
             }
             (self.next[parent], self.ahead[parent], self.continues[branch]) = (branch, branch, true);
+            if axis == NONE {
+                ends.push(parent);
+            }
         }
+        ends.sort_unstable();
+        for (i, segment) in segments.iter().enumerate().filter(|(i, _)| !self.continues[*i]) {
+            let Some(parent) = segment.grows_from.filter(|_| segment.follows.is_none()) else { continue };
+            let at_end = kept(i) && ends.binary_search(&parent).is_ok();
+            if at_end && self.goes_on(parent, i) && self.is_limb(segments, [parent, i], &widest) {
+                self.forks.resize(segments.len(), NONE);
+                self.forks[i] = parent;
+            }
+        }
+    }
+
+    /// Whether a branch is wide enough to go on from the end of an axis.
+    fn goes_on(&self, end: usize, branch: usize) -> bool {
+        self.radii[branch][0] >= GOES_ON * self.radii[end][1]
+    }
+
+    /// Whether a branch may leave a segment, whose axis was as wide as that, smoothly.
+    fn is_limb(&self, segments: &[Segment], [parent, branch]: [usize; 2], widest: &[f64]) -> bool {
+        let (end, width) = (self.radii[parent][1], self.radii[branch][0]);
+        let (from, to) = (&segments[parent], &segments[branch]);
+        end > 0.0
+            && width <= LIMB * widest[parent]
+            && from.contour == to.contour
+            && joins([from, to], [end, width], true)
+    }
+
+    /// The segment at the end of which the tube bends away whose first segment this is.
+    pub(super) fn fork(&self, first: usize) -> Option<usize> {
+        self.forks.get(first).copied().filter(|parent| *parent != NONE)
     }
 
     /// The segment that this one comes out of as a branch.
