@@ -430,3 +430,133 @@ fn a_module_goes_on_with_the_neighbour_that_comes_when_another_dies() {
         }
     }
 }
+
+/// A condition of a production may jump where a value takes a whole number, or changes its sign: whichever way the instant of that is
+/// rounded, the jump is seen.
+#[test]
+fn conditions_that_jump_are_seen_wherever_the_jump_is() {
+    for condition in [
+        "floor(x)/x >= 0.9475",
+        "x - floor(x) < 0.1 & x > 0.7",
+        "floor(x) - 0.1*x > 0.85",
+        "x - 2*floor(x/2) < 0.3 & x > 0.8 | floor(x) > 0.5",
+        "sign(x - 1) - 0.1*x > 0.5",
+        "(if x < 1 then 0 else 2 - x) > 0.5",
+        "ceil(-x) + 1 - 0.3*(x - 1) <= 0",
+    ] {
+        for rate in ["1", "1.07", "0.3 + 0*x", "0.2*x"] {
+            for step in 0..40 {
+                let start = 0.05 + 0.023 * f64::from(step);
+                let text = format!(
+                    "initial string: A({start})\nA(x):\n  solve dx/dt = {rate}\n  if {condition} produce E\n"
+                );
+                let exact = match rate {
+                    "0.2*x" => -5.0 * start.ln(),
+                    rate => (1.0 - start) / rate.trim_end_matches(" + 0*x").parse::<f64>().expect("a number"),
+                };
+                for method in [Method::Auto, Method::Dopri5] {
+                    let settings = Settings { method, ..Settings::default() };
+                    let found = first_event(&text, settings, 30.0).unwrap_or_else(|e| panic!("{text}{e}"));
+                    let error = (found.unwrap_or(f64::INFINITY) - exact).abs();
+                    assert!(error < 1e-4, "{found:?}, not {exact}, {method:?}, of\n{text}");
+                }
+            }
+        }
+    }
+}
+
+/// A stiff value that follows another one is where that is, at all times and not only where steps end: y = g - g'/K + O(1/K²) for
+/// y' = -K (y - g(t)).
+#[test]
+fn stiff_values_follow_what_they_are_drawn_to_between_the_stages_of_steps() {
+    for rate in [1e5, 1e6, 1e8] {
+        let sine = format!("-{rate:e}*(y - sin(t)) + 0.001*sin(y)");
+        let ramp = format!("-{rate:e}*(y - tanh(3*(t - 8))) + 0.001*sin(y)");
+        let air = format!("{rate:e}*(x - y)");
+        let alone =
+            |law: &str, extra: &str| format!("initial string: B(0)\nB(y):\n  solve dy/dt = {law}\n{extra}");
+        let beside = |extra: &str| {
+            format!(
+                "initial string: A(0) B(0)\nA(x): solve x = sin(t)\nA(x) < B(y):\n  solve dy/dt = {air}\n{extra}"
+            )
+        };
+        let event = "  if y > 1.5 produce E\n";
+        let cases: [(String, fn(f64) -> f64); 6] = [
+            (alone(&sine, ""), f64::sin),
+            (alone(&sine, event), f64::sin),
+            (alone(&ramp, ""), |t| (3.0 * (t - 8.0)).tanh()),
+            (alone(&ramp, event), |t| (3.0 * (t - 8.0)).tanh()),
+            (beside(""), f64::sin),
+            (beside(event), f64::sin),
+        ];
+        for (text, target) in cases {
+            let session = session(&text);
+            let mut simulation = session.simulate(Settings::default()).expect("it starts");
+            let mut string = Default::default();
+            for step in 1..=40 {
+                let t = 0.37 * f64::from(step);
+                simulation.at(t, &mut string).unwrap_or_else(|e| panic!("{text}{e}"));
+                let y = string.iter().last().expect("a module").parameters[0];
+                let error = (y - target(t)).abs() - 3.0 / rate;
+                assert!(error < 1e-3, "{error:.1e} at {t} of\n{text}");
+            }
+        }
+        let peak = format!("{}  if y > 0.9999 produce E\n", beside(""));
+        let found = first_event(&peak, Settings::default(), 3.0).expect("it runs");
+        let exact = 0.9999f64.asin();
+        assert!(found.is_some_and(|t| (t - exact).abs() < 0.01), "{found:?}, not {exact}, of\n{peak}");
+    }
+}
+
+/// A pulse is no less for what stands beside it: a rate, a wave, or an equation that relaxes; in a module, or in a value that a neighbour
+/// reads.
+#[test]
+fn pulses_beside_something_larger_are_seen() {
+    let root = std::f64::consts::PI.sqrt();
+    for (base, total) in [("1", 20.0), ("5*sin(0.3*t)", 5.0 / 0.3 * (1.0 - 6f64.cos())), ("30", 600.0)] {
+        for width in [0.3, 0.03, 0.01] {
+            for height in [0.3, 1.0, 7.0, 20.0] {
+                for place in 0..6 {
+                    let centre = 3.13 + 2.317 * f64::from(place);
+                    let pulse = format!("{height}*exp(-((t - {centre})/{width})^2)");
+                    let texts = [
+                        format!("initial string: A(0)\nA(y): solve dy/dt = {base} + {pulse}\n"),
+                        format!("initial string: A(0)\nA(y): solve dy/dt = sqrt(({base} + {pulse})^2)*sign({base} + {pulse})\n"),
+                        format!("initial string: V(0) A(0)\nV(v): solve v = {base} + {pulse}\nV(v) < A(y): solve dy/dt = v\n"),
+                    ];
+                    for (which, text) in texts.iter().enumerate() {
+                        if which == 1 && base != "1" {
+                            continue;
+                        }
+                        let end = run(text, Settings::default(), 20.0);
+                        let y = end.last().expect("a module").1[0];
+                        let exact = total + height * width * root;
+                        assert!((y - exact).abs() < 1e-4 * exact.abs().max(1.0), "{y}, not {exact}, of\n{text}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What is left of a value that was large has all its digits.
+#[test]
+fn what_is_left_of_a_large_value_has_its_digits() {
+    let value = |text: &str, at: f64| run(text, Settings::default(), at).last().expect("a module").1[0];
+    let falls = "initial string: A(0)\nA(v): solve v = exp(50 - t)\n";
+    for at in [40.0, 48.0, 50.0, 70.0f64] {
+        let (found, exact) = (value(falls, at), (50.0 - at).exp());
+        assert!((found - exact).abs() < 1e-9 * exact, "{found}, not {exact}");
+    }
+    let decays = "initial string: A(1e17)\nA(x): solve dx/dt = -x\n";
+    assert!((value(decays, 40.0) / (1e17 * (-40f64).exp()) - 1.0).abs() < 1e-9);
+    for (law, level, exact) in [
+        ("solve x = (age + 1e-6)^-3", 0.5, 2f64.cbrt() - 1e-6),
+        ("solve x = 1/(age + 1e-9)^2", 0.5, 2f64.sqrt() - 1e-9),
+        ("solve x = exp(50 - t)", 1e-3, 50.0 - 1e-3f64.ln()),
+    ] {
+        let text = format!("initial string: A(0)\nA(x):\n  {law}\n  if x <= {level} produce B\n");
+        let found = first_event(&text, Settings::default(), 100.0).expect("it runs");
+        assert!(found.is_some_and(|t| (t - exact).abs() < 1e-6), "{found:?}, not {exact}, of\n{text}");
+    }
+}

@@ -153,7 +153,8 @@ impl<F: Function> Search<'_, F> {
         let found = if !self.armed {
             self.leave_zero(lo, hi, end)
         } else {
-            match self.crossing(lo, hi, end, monotone) {
+            let steepest = monotone.then(|| rate.magnitude());
+            match self.jumped(lo).or_else(|| self.crossing(lo, hi, end, steepest)) {
                 None if monotone => None,
                 None if last => self.judge(lo, hi),
                 None => self.touch(lo, hi, end),
@@ -163,9 +164,18 @@ impl<F: Function> Search<'_, F> {
         found.map_or(Finding::Nothing, Finding::Root)
     }
 
-    /// A change of sign in a stretch that is monotone or narrow and has the sign `end` at its end.
-    fn crossing(&mut self, lo: f64, hi: f64, end: Sign, monotone: bool) -> Option<Root> {
-        let sign = self.sign;
+    /// A jump at the beginning of a stretch: the bounds of the stretch before, which excluded it, are those of values that are rounded
+    /// another way.
+    fn jumped(&mut self, lo: f64) -> Option<Root> {
+        let there = self.sign_at(lo);
+        let jumps = matches!(self.sign, Sign::Plus | Sign::Minus) && there == opposite(self.sign);
+        jumps.then_some(Root { position: lo, at: there, after: there })
+    }
+
+    /// A change of sign in a stretch that is narrow, or monotone with a rate of no more than `steepest`, and has the sign `end` at its
+    /// end.
+    fn crossing(&mut self, lo: f64, hi: f64, end: Sign, steepest: Option<f64>) -> Option<Root> {
+        let (sign, monotone) = (self.sign, steepest.is_some());
         // Exactly: a value that merely comes within the tolerance may be about to cross.
         let exact = Sign::of(self.f.value(hi));
         // At the very end of the stretch, if it is about to cross within the rounding of the position.
@@ -181,6 +191,12 @@ impl<F: Function> Search<'_, F> {
             return None;
         }
         let position = bracket(self.f, lo, hi, sign);
+        // It jumps where its bounds say that it does not, as above.
+        let step = steepest.map_or(f64::INFINITY, |rate| 16.0 * f64::EPSILON * hi * rate);
+        let there = self.f.value(position);
+        if there.abs() > self.tolerance + step && Sign::of(there) == exact {
+            return Some(Root { position, at: exact, after: exact });
+        }
         if monotone {
             // One that ends on zero may turn back there, or rest.
             let after = if exact == Sign::Zero { self.way_out(hi).1 } else { exact };
@@ -222,7 +238,7 @@ impl<F: Function> Search<'_, F> {
             let to = if i == PARTS { hi } else { lo + (hi - lo) * (i as f64 / PARTS as f64) };
             for at in [self.extreme(from, to), Some(to)].into_iter().flatten() {
                 let end = self.sign_at(at);
-                let root = self.crossing(from, at, end, false).or_else(|| self.touch(from, at, end));
+                let root = self.crossing(from, at, end, None).or_else(|| self.touch(from, at, end));
                 if root.is_some() {
                     return root;
                 }

@@ -26,6 +26,12 @@ const END_IS_BETTER: f64 = 4.0;
 /// After so many rejections of one step, rounding may be the reason.
 const MANY_REJECTIONS: u32 = 6;
 
+/// An implicit step may be as long as thousands of periods of what a stiff component follows: its ends lie on that, whatever is
+/// between them. So many times it is cut.
+const MANY_PERIODS: u32 = 40;
+/// The part of the length at which the inside of the next implicit step would err by as much as is tolerated.
+const SAFETY: f64 = 0.8;
+
 /// Errors below this part of the tolerated one, relative to max(1, |value|), are accepted where shorter steps do not help.
 const NEGLIGIBLE: f64 = 1e-2;
 
@@ -369,28 +375,31 @@ impl Stepper {
         step: Step<'_>,
         (error, rounding): (f64, f64),
     ) -> Verdict {
-        let h = step.h;
+        let (h, is_implicit) = (step.h, tries.scheme.facts().is_implicit);
         let (inside, output) = self.look_inside(tries.scheme, system, step);
-        if inside.absolute > INTERIOR * tries.outer && tries.interior_rejections < MANY_REJECTIONS {
+        let most = if is_implicit { MANY_PERIODS } else { MANY_REJECTIONS };
+        let fit = (INTERIOR * tries.outer / inside.absolute).powf(1.0 / (f64::from(tries.order) + 1.0));
+        if inside.absolute > INTERIOR * tries.outer && tries.interior_rejections < most {
             self.rejected += 1;
             tries.interior_rejections += 1;
-            return Verdict::Again(
-                h * (INTERIOR * tries.outer / inside.absolute).powf(0.125).clamp(0.3, 0.9),
-            );
+            return Verdict::Again(h * fit.clamp(0.3, 0.9));
         }
         // Only of a step that is taken: a rejected one leaves nothing behind.
         self.output = output;
         if !tries.is_fixed {
             // Rounding is no reason to shorten a step that is good, only not to lengthen it.
             let most = if tries.failed || rounding > 0.5 { 1.0 } else { 10.0 };
-            let next = h * growth(error, control.last_error, tries.order).clamp(0.2, most);
+            let mut next = h * growth(error, control.last_error, tries.order).clamp(0.2, most);
+            if is_implicit {
+                next = next.min(h * (SAFETY * fit).max(0.2));
+            }
             // A step that had to end early says nothing against longer ones.
             control.size = if 2.0 * h > tries.room { next.max(control.size) } else { next };
             control.last_error = error;
             control.error = (control.error
                 + CAUTION * TOLERANCE_SHARE * tries.outer * error
-                + inside.relative / END_IS_BETTER)
-                .min(CERTAINTY * tries.outer);
+                + if is_implicit { 0.0 } else { inside.relative / END_IS_BETTER })
+            .min(CERTAINTY * tries.outer);
             self.error = control.error + inside.relative;
         }
         Verdict::Accepted

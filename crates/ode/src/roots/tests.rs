@@ -211,3 +211,37 @@ fn what_varies_fast_is_searched_in_stretches() {
     // At once, it takes more pieces than there may be.
     assert!(find(f64::INFINITY).is_none_or(|root| (root.position - exact).abs() > 1e-6));
 }
+
+/// A function that jumps up by 1 at one half and falls between jumps at a constant rate: its bounds say that it jumps just after one half.
+struct Rounded {
+    rate: f64,
+    level: f64,
+}
+
+impl Rounded {
+    fn at(&self, jumped: bool, at: f64) -> f64 {
+        f64::from(u8::from(jumped)) - self.rate * at - self.level
+    }
+}
+
+impl Function for Rounded {
+    fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
+        let rate = Interval::constant(-self.rate);
+        let [before, after] = [hi <= 0.5, lo >= 0.5];
+        let value = Interval { lo: self.at(after, hi), hi: self.at(!before, lo), partial: !before && !after };
+        Dual { value, rate: Interval { partial: value.partial, ..rate } }
+    }
+    fn value(&mut self, at: f64) -> f64 {
+        self.at(at >= 0.5, at)
+    }
+}
+
+#[test]
+fn a_jump_is_seen_where_bounds_are_rounded_another_way() {
+    for (rate, level) in [(1.0, 0.45), (0.0, 0.6), (0.1, 0.9), (0.01, 0.5)] {
+        let root = first_root(&mut Rounded { rate, level }, 0.0, 1.0, Sign::Minus, 1e-15);
+        let expected = Root { position: 0.5, at: Sign::Plus, after: Sign::Plus };
+        assert!(root.is_some_and(|root| (root.position - 0.5).abs() < 1e-12), "{rate} {level}: {root:?}");
+        assert_eq!(root.map(|root| Root { position: 0.5, ..root }), Some(expected), "{rate} {level}");
+    }
+}

@@ -14,10 +14,10 @@ mod stages;
 
 use crate::Rates;
 use crate::dense::Dense;
-use crate::one_step::{Nodes, OneStep, Step, Trial};
+use crate::one_step::{InteriorError, Nodes, OneStep, Step, Trial};
 use crate::sparse::Pattern;
 use crate::workspace::{FLOOR, Workspace};
-use dlsys_expr::SimTime;
+use dlsys_expr::{Dual, SimTime};
 use stages::{Attempt, Stages, Start, Stiff};
 
 /// Tighter than this, five stages need fewer evaluations than three.
@@ -89,6 +89,8 @@ fn blur(couplings: &[(u32, u32)], partials: &[f64], y: &[f64], h: f64, out: &mut
 impl OneStep for Radau {
     /// Between the ends of its long steps the solution is known less well than there.
     const TOLERANCE_SHARE: f64 = 0.01;
+    /// A stiff component lies on what it follows at the stages, however many periods of that are between them.
+    const INTERIOR_IS_MEASURED: bool = true;
 
     fn prepare(&mut self, tolerance: f64) {
         let count = if tolerance < FIVE_STAGES_BELOW { 5 } else { 3 };
@@ -176,6 +178,41 @@ impl OneStep for Radau {
             stages.count()
         });
         Dense::new(step.start, None, step.h, count, self.coefficients.clone())
+    }
+
+    /// By the defect between stages, the difference between the rates of the equations and that of the output, filtered as the estimate
+    /// at the end is: of a stiff component, that is its distance from what it follows.
+    fn interior_error(
+        &self,
+        work: &mut Workspace,
+        system: &mut impl Rates,
+        y: &[f64],
+        dense: &Dense,
+    ) -> InteriorError {
+        let (Some(stages), Some(Structure { pattern, .. })) = (&self.stages, &self.pattern) else {
+            return InteriorError::default();
+        };
+        let (mut inside, mut slopes) = (InteriorError::default(), vec![0.0; y.len()]);
+        for place in stages.between() {
+            for (component, slope) in slopes.iter_mut().enumerate() {
+                let Dual { value, rate } = dense.departure(component, place);
+                (work.stage[component], *slope) = (value, rate);
+            }
+            work.evaluate(system, place * dense.h, 1);
+            let rates = slopes.iter().zip(&work.k[1]);
+            let mut errors: Vec<f64> = rates.map(|(slope, rate)| dense.h * rate - slope).collect();
+            stages.settle(pattern, &mut errors);
+            for (component, error) in errors.into_iter().enumerate() {
+                if !error.is_finite() {
+                    continue;
+                }
+                let moved = (dense.h * work.k[0][component]).abs().max(slopes[component].abs());
+                let scale = y[component].abs().max(moved).max(work.stage[component].abs()) + FLOOR;
+                inside.relative = inside.relative.max(error.abs() / scale);
+                inside.absolute = inside.absolute.max(error.abs() / y[component].abs().max(1.0));
+            }
+        }
+        inside
     }
 
     fn accept(&mut self, _: &mut Workspace) -> bool {

@@ -5,7 +5,7 @@
 
 use super::collocation::Collocation;
 use super::stages::{Attempt, Start, Stiff};
-use crate::sparse::{Field, Wide};
+use crate::sparse::{Field, Pattern, Wide};
 
 /// Longest extrapolation of the collocation polynomial, in lengths of the step before.
 const EXTRAPOLATE: f64 = 10.0;
@@ -354,6 +354,13 @@ impl<const S: usize, const L: usize> Newton<S, L> {
         self.shares.clear();
         self.shares.extend(self.rhs.iter().zip(&self.weight).map(|(e, w)| (e.re[0] * w).abs()));
         self.shares.iter().fold(0.0, |m, &v| if v > m || v.is_nan() { v } else { m })
+    }
+
+    /// Filters a defect as the estimate of the error is.
+    pub fn settle(&self, pattern: &Pattern, defect: &mut [f64]) {
+        let mut wide: Vec<Wide<L>> = defect.iter().map(|v| Wide::from_f64(*v)).collect();
+        pattern.solve(&self.factors, &mut wide);
+        defect.iter_mut().zip(&wide).for_each(|(v, wide)| *v = wide.re[0]);
     }
 
     pub fn dense(&self, y: &[f64], out: &mut Vec<f64>) {

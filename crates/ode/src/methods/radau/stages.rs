@@ -82,6 +82,19 @@ impl Stages {
         each!(self, newton => newton.nodes())
     }
 
+    /// Two places in a step as far from nodes as any.
+    pub fn between(&self) -> [f64; 2] {
+        match self.nodes() {
+            [a, b, c] => [0.5 * (a + b), 0.5 * (b + c)],
+            nodes => [0.5 * (nodes[1] + nodes[2]), 0.5 * (nodes[2] + nodes[3])],
+        }
+    }
+
+    /// Replaces a defect, in units of the components, with the errors of the last attempt done that would leave it.
+    pub fn settle(&self, pattern: &Pattern, defect: &mut [f64]) {
+        each!(self, newton => newton.settle(pattern, defect));
+    }
+
     /// Tries a step of length `h` (not 0). An attempt after one that was not accepted must have the same start, else call
     /// `forget` before.
     pub fn attempt(&mut self, problem: &mut impl Stiff, start: &Start<'_>, h: f64) -> Attempt {
