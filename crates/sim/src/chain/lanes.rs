@@ -395,7 +395,7 @@ impl Block {
                 let laws = clause.solution_forms.iter().zip(&clause.of).zip(&self.coefficients);
                 for ((law, &parameter), c) in laws.filter(|((_, of), _)| Some(**of) != law.meets) {
                     let x = &mut self.registers[parameter][lane];
-                    *x += trajectory(law, c, lane, *x).value(age.max(0.0));
+                    *x = trajectory(law, c, lane, *x).at(*x, age.max(0.0));
                 }
             }
             // Where the instant is known from a level, the value is that level, not a rounding of it.

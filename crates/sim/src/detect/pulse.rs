@@ -18,6 +18,9 @@
 //! function of a difference of two values that move together, so it is bounded by its value in the middle of a piece and its derivative along the dense
 //! output, too, in which the two rates cancel: the excess of that bound falls with the square of the piece.
 //!
+//! In all equations a pulse may stand beside something larger, so each such term is also compared with its own change: where its bounds go beyond the
+//! range of its values at the stages by far more than that range, they show what no stage has seen.
+//!
 //! Steps whose rates cannot be bounded are counted; `run --stats` and `explain` report their rules.
 
 use smallvec::SmallVec;
@@ -32,6 +35,8 @@ use dlsys_tree::SimTime;
 
 /// A rate may be overlooked where its bound is this many times larger than all its values at the stages.
 const SURPRISE: f64 = 8.0;
+/// A pulse may be overlooked where the bounds of a term go beyond its range at the stages by this many times that range.
+const SURPRISING_CHANGE: f64 = 8.0;
 /// Pieces narrower than this part of a step are not halved any more.
 const NARROW: f64 = 1.0 / 256.0;
 /// Most pieces of a step that are examined.
@@ -93,6 +98,7 @@ pub struct PulseDetector {
     values: Vec<f64>,
     bounds: Vec<Interval>,
     seen: Vec<f64>,
+    ranges: Vec<Interval>,
     out: Vec<f64>,
     bounds_out: Vec<Interval>,
     scratch: Scratch<f64>,
@@ -109,6 +115,20 @@ impl PulseDetector {
     /// Bounds the rates of the module's equations, and its values that are solved for, along a step, and compares them
     /// with the values at the stages.
     pub fn examine(&mut self, step: &ExaminedStep) -> PulseFinding {
+        let finding = self.examine_sizes(step);
+        if step.stiff || finding != PulseFinding::Clear {
+            return finding;
+        }
+        let (all, pulses) = (step.end.since(step.start), &step.solve.pulses);
+        let mut first = self.examine_changes(step, &pulses.rates, all);
+        if step.state.numeric_only {
+            first = first.earlier(self.examine_changes(step, &pulses.formula_rates, all));
+        }
+        first.earlier(self.examine_changes(step, &pulses.values, 1.0))
+    }
+
+    /// As [`PulseDetector::examine`], by the sizes of rates, or of terms where the equations are stiff.
+    fn examine_sizes(&mut self, step: &ExaminedStep) -> PulseFinding {
         if step.stiff {
             let (all, pulses) = (step.end.since(step.start), &step.solve.pulses);
             let mut first = self.examine_terms(step, &pulses.rates, all);
@@ -175,6 +195,59 @@ impl PulseDetector {
         along(step, |path, part| self.compare(path, terms, scale * part, part, step))
     }
 
+    /// Compares bounds of terms with the range of their values at the ends of the step, and if need be at all stages.
+    fn examine_changes(&mut self, step: &ExaminedStep, terms: &Program, scale: f64) -> PulseFinding {
+        if terms.outputs() == 0 {
+            return PulseFinding::Clear;
+        }
+        self.ranges.clear();
+        self.ranges.resize(terms.outputs(), Interval::EMPTY);
+        let mut finding = PulseFinding::Clear;
+        for nodes in [&[0.0, 1.0][..], step.nodes] {
+            self.widen_ranges(step, terms, nodes);
+            finding = along(step, |path, part| self.compare_changes(path, terms, scale * part, part, step));
+            if finding == PulseFinding::Clear {
+                break;
+            }
+        }
+        finding
+    }
+
+    /// Includes the values of a program at some positions of a step in its ranges.
+    fn widen_ranges(&mut self, step: &ExaminedStep, program: &Program, nodes: &[f64]) {
+        let all = step.end.since(step.start);
+        self.out.resize(program.outputs(), 0.0);
+        for node in nodes {
+            let at = (step.start.after(node * all), 0.0);
+            let path = Path::of_equations(step.world, step.state, step.rule, at, step.own);
+            path.everything_at(0.0, &mut self.values);
+            program.eval(&self.values, &mut self.scratch, &mut self.out);
+            for (range, value) in self.ranges.iter_mut().zip(&self.out) {
+                let known = !range.is_empty();
+                range.lo = if known { range.lo.min(*value) } else { *value };
+                range.hi = if known { range.hi.max(*value) } else { *value };
+            }
+        }
+    }
+
+    /// Compares bounds of terms along a path with their ranges; as [`PulseDetector::compare`].
+    fn compare_changes(
+        &mut self,
+        path: &Path,
+        terms: &Program,
+        scale: f64,
+        part: f64,
+        step: &ExaminedStep,
+    ) -> PulseFinding {
+        self.halve(path, terms, part, true, |bounds, detector, length| {
+            bounds.iter().zip(&detector.ranges).any(|(bounds, range)| {
+                let excess = (bounds.hi - range.hi).max(range.lo - bounds.lo);
+                !(excess <= SURPRISING_CHANGE * (range.hi - range.lo)
+                    || excess * scale * length <= step.tolerance)
+            })
+        })
+    }
+
     /// Evaluates a program at the stages of the method, and keeps the largest size of each output.
     fn sample(&mut self, step: &ExaminedStep, program: &Program, all: f64) {
         self.seen.clear();
@@ -201,24 +274,35 @@ impl PulseDetector {
         part: f64,
         step: &ExaminedStep,
     ) -> PulseFinding {
+        self.halve(path, program, part, step.stiff, |bounds, detector, length| {
+            bounds.iter().zip(&detector.seen).any(|(bounds, seen)| {
+                let size = bounds.magnitude();
+                !(size <= SURPRISE * seen || size * scale * length <= step.tolerance)
+            })
+        })
+    }
+
+    /// Bounds a program over a path, and over halves of pieces of it as long as the bounds are a surprise in a piece of some length.
+    fn halve(
+        &mut self,
+        path: &Path,
+        program: &Program,
+        part: f64,
+        tightens: bool,
+        is_surprise: impl Fn(&[Interval], &PulseDetector, f64) -> bool,
+    ) -> PulseFinding {
         let mut stack: SmallVec<[(f64, f64); 16]> = SmallVec::new();
         stack.push((0.0, 1.0));
         let mut pieces = 0;
         while let Some((lo, hi)) = stack.pop() {
             pieces += 1;
             self.bound(path, program, (lo, hi));
-            let surprises = |bounds: &[Interval], seen: &[f64]| {
-                bounds.iter().zip(seen).any(|(bounds, seen)| {
-                    let size = bounds.magnitude();
-                    !(size <= SURPRISE * seen || size * scale * (hi - lo) <= step.tolerance)
-                })
-            };
-            if !surprises(&self.bounds_out, &self.seen) {
+            if !is_surprise(&self.bounds_out, self, hi - lo) {
                 continue;
             }
-            if step.stiff && !path.world.stretch.is_finite() {
+            if tightens && !path.world.stretch.is_finite() {
                 self.tighten(path, program, (lo, hi));
-                if !surprises(&self.bounds_out, &self.seen) {
+                if !is_surprise(&self.bounds_out, self, hi - lo) {
                     continue;
                 }
             }

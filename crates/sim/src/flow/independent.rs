@@ -109,7 +109,7 @@ impl Independent<'_> {
             self.variables[variable] = value;
         }
         for &(variable, trajectory, x) in &self.formulas {
-            self.variables[variable] = x + trajectory.value(self.offset + tau);
+            self.variables[variable] = trajectory.at(x, self.offset + tau);
         }
         self.variables[self.time] = self.t + tau;
         self.variables[self.time + 1] = self.age + tau;

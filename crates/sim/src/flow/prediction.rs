@@ -206,7 +206,7 @@ pub fn values_at_event(life: &Life, at: SimTime, out: &mut Vec<f64>) {
         out.push(match (life.trajectories.get(i), life.level) {
             (_, Some((parameter, level))) if parameter == i => level,
             (None | Some(Trajectory::Rest), _) => x,
-            (Some(formula), _) => x + formula.value(tau),
+            (Some(formula), _) => formula.at(x, tau),
         });
     }
 }

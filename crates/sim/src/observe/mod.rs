@@ -133,7 +133,7 @@ impl Simulation<'_> {
                         }
                         let mut moved = registers[parameter];
                         for (i, x) in moved.iter_mut().enumerate().take(rows.len()) {
-                            *x += Riccati::new(*x, c[0][i], c[1][i], c[2][i]).value(tau[i]);
+                            *x = Riccati::new(*x, c[0][i], c[1][i], c[2][i]).at(*x, tau[i]);
                         }
                         moved
                     }

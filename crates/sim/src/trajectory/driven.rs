@@ -173,6 +173,14 @@ impl AutonomousFlow {
         }
     }
 
+    /// The value at s, if it was `x` at 0; None if there is only a displacement.
+    pub fn directly(&self, x: f64, s: f64) -> Option<f64> {
+        match self {
+            AutonomousFlow::Riccati(forward, _) => forward.directly(x, s),
+            AutonomousFlow::Growth(growth) => Some(growth.directly(s)),
+        }
+    }
+
     fn rate(&self, u: f64) -> f64 {
         match self {
             AutonomousFlow::Riccati(forward, _) => forward.rate(u),
@@ -230,6 +238,11 @@ impl DrivenSolution {
     /// The displacement at a time since the start.
     pub fn value(&self, tau: f64) -> f64 {
         if tau == 0.0 { 0.0 } else { self.flow.value(self.s(tau)) }
+    }
+
+    /// The value itself, at a time since the start, at which it was `x`; None if there is only a displacement.
+    pub fn directly(&self, x: f64, tau: f64) -> Option<f64> {
+        self.flow.directly(x, self.s(tau))
     }
 
     /// The rate at a time since the start.

@@ -52,7 +52,17 @@ impl FunctionOfTime {
 
     fn at(&self, tau: f64) -> f64 {
         let time = [self.variables[self.time] + tau, self.variables[self.time + 1] + tau];
-        self.evaluate(self.variables.clone(), |trajectory, x| x + trajectory.value(tau), time)
+        self.evaluate(self.variables.clone(), |trajectory, x| trajectory.at(x, tau), time)
+    }
+
+    /// The value itself, if the trajectory began at `x`.
+    pub fn directly(&self, x: f64, tau: f64) -> Option<f64> {
+        (x == self.start).then(|| self.at(tau))
+    }
+
+    /// Bounds of the value itself.
+    pub fn directly_over(&self, x: f64, from: f64, to: f64) -> Option<Interval> {
+        (x == self.start).then(|| self.bounds(from, to).value)
     }
 
     /// The displacement at a time since the start.
@@ -65,7 +75,7 @@ impl FunctionOfTime {
         let still = |value: f64| Dual { value, rate: 0.0 };
         let time = [self.time, self.time + 1].map(|v| Dual { value: self.variables[v] + tau, rate: 1.0 });
         let trajectory = |trajectory: &Trajectory, x: f64| Dual {
-            value: x + trajectory.value(tau),
+            value: trajectory.at(x, tau),
             rate: trajectory.rate(tau),
         };
         self.evaluate(self.variables.iter().map(|x| still(*x)).collect(), trajectory, time).rate
@@ -73,16 +83,18 @@ impl FunctionOfTime {
 
     /// Bounds of displacement and rate from one time to another.
     pub fn over(&self, from: f64, to: f64) -> Dual<Interval> {
+        let Dual { value, rate } = self.bounds(from, to);
+        Dual { value: Interval { lo: value.lo - self.start, hi: value.hi - self.start, ..value }, rate }
+    }
+
+    /// Bounds of value and rate.
+    fn bounds(&self, from: f64, to: f64) -> Dual<Interval> {
         let time = [self.time, self.time + 1].map(|v| {
             let value = Interval::spanned(self.variables[v] + from, self.variables[v] + to);
             Dual { value, rate: Interval::constant(1.0) }
         });
-        let trajectory = |trajectory: &Trajectory, x: f64| {
-            let Dual { value, rate } = trajectory.over(from, to);
-            Dual { value: Interval { lo: x + value.lo, hi: x + value.hi, ..value }, rate }
-        };
+        let trajectory = |trajectory: &Trajectory, x: f64| trajectory.within(x, from, to);
         let still = self.variables.iter().map(|x| Dual::constant(*x)).collect();
-        let Dual { value, rate } = self.evaluate(still, trajectory, time);
-        Dual { value: Interval { lo: value.lo - self.start, hi: value.hi - self.start, ..value }, rate }
+        self.evaluate(still, trajectory, time)
     }
 }

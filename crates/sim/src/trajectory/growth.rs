@@ -84,6 +84,11 @@ impl Growth {
         if self.f == 0.0 || s == 0.0 { 0.0 } else { self.x * self.logarithm(s).exp_m1() }
     }
 
+    /// The value itself at a time since the start.
+    pub fn directly(&self, s: f64) -> f64 {
+        self.x * self.logarithm(s).exp()
+    }
+
     /// The rate where the displacement is `u`.
     pub fn rate(&self, u: f64) -> f64 {
         let size = self.x + u;

@@ -1,7 +1,8 @@
 //! Trajectories: the motion of one parameter of one module from an instant on, in closed form or along dense output.
 //!
 //! Time is counted from the start of the trajectory, and values are displacements from the value there, so that a module
-//! born at t = 1e9 moves as precisely as one born at 0.
+//! born at t = 1e9 moves as precisely as one born at 0. Where little is left of the value at the start, its displacement has lost the
+//! digits of what is left, and that is computed from the solution itself ([`Trajectory::at`]).
 
 mod driven;
 mod function;
@@ -39,7 +40,50 @@ pub enum Trajectory {
     Coupled(u32),
 }
 
+/// A value of less than this part of that at the start is not computed as a displacement.
+const LITTLE: f64 = 1e-6;
+
 impl Trajectory {
+    /// The value at a time since the start, at which it was `x`; NaN for dense output.
+    #[inline]
+    pub fn at(&self, x: f64, tau: f64) -> f64 {
+        let value = x + self.value(tau);
+        if value.abs() < LITTLE * x.abs() { self.directly(x, tau).unwrap_or(value) } else { value }
+    }
+
+    /// Bounds of value and rate from one time since the start, at which the value was `x`, to another; unbounded for dense output.
+    #[inline]
+    pub fn within(&self, x: f64, from: f64, to: f64) -> Dual<Interval> {
+        let Dual { value, rate } = self.over(from, to);
+        let value = Interval { lo: x + value.lo, hi: x + value.hi, ..value };
+        let direct = || match self {
+            Trajectory::Sum(sum) => sum.directly_over(x, from, to),
+            Trajectory::Function(function) => function.directly_over(x, from, to),
+            // Monotonic.
+            _ => Some(Interval::spanned(self.directly(x, from)?, self.directly(x, to)?)),
+        };
+        let value = if value.magnitude() < LITTLE * x.abs() { direct().unwrap_or(value) } else { value };
+        Dual { value, rate }
+    }
+
+    /// The size of what is rounded in a value that was `x` at the start.
+    pub fn rounded(&self, x: f64, value: f64) -> f64 {
+        let is_direct = value.abs() < LITTLE * x.abs() && self.directly(x, 0.0).is_some();
+        if is_direct { value.abs() } else { x.abs() }
+    }
+
+    /// The value, not as a displacement; None if there is no other form.
+    #[cold]
+    fn directly(&self, x: f64, tau: f64) -> Option<f64> {
+        match self {
+            Trajectory::Riccati(law) => law.directly(x, tau),
+            Trajectory::Sum(sum) => sum.directly(x, tau),
+            Trajectory::Driven(driven) => driven.directly(x, tau),
+            Trajectory::Function(function) => function.directly(x, tau),
+            _ => None,
+        }
+    }
+
     /// True for a closed form, which is evaluated and not integrated.
     pub fn is_formula(&self) -> bool {
         !matches!(self, Trajectory::Step(_) | Trajectory::Coupled(_))

@@ -4,6 +4,7 @@
 //! `d = b + 2 a x(0)`. The discriminant `d² - 4 a f = b² - 4 a c` tells the cases apart. All formulas avoid
 //! cancellation: a start of 1e-300, a threshold 1e-12 from the limit, and a life of 1e-12 keep their digits.
 
+use super::LITTLE;
 use dlsys_expr::{Dual, Interval};
 
 /// A growth law of one parameter, from one start.
@@ -87,6 +88,18 @@ impl Riccati {
                 self.f * s / (self.w * c - 0.5 * self.d * s)
             }
         }
+    }
+
+    /// The value at a time since the start, at which it was `x`, for `x' = b x`: not by its displacement.
+    pub fn directly(&self, x: f64, tau: f64) -> Option<f64> {
+        let decays = self.case == Case::Exponential && self.f == self.d * x;
+        decays.then(|| x * (self.d * tau).exp())
+    }
+
+    /// The same for any equation; by the displacement where that has the digits.
+    pub fn at(&self, x: f64, tau: f64) -> f64 {
+        let value = x + self.value(tau);
+        if value.abs() < LITTLE * x.abs() { self.directly(x, tau).unwrap_or(value) } else { value }
     }
 
     /// The rate where the displacement is `u`.

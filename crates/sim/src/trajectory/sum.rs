@@ -333,6 +333,22 @@ impl TermSum {
         self.terms.iter().map(|t| t.value(tau)).sum::<f64>() - self.start
     }
 
+    /// The value itself, if the trajectory began at `x`.
+    pub fn directly(&self, x: f64, tau: f64) -> Option<f64> {
+        self.begins_at(x).then(|| self.terms.iter().map(|t| t.value(tau)).sum())
+    }
+
+    /// Bounds of the value itself.
+    pub fn directly_over(&self, x: f64, from: f64, to: f64) -> Option<Interval> {
+        let tau = Interval::spanned(from, to);
+        let add = |sum, term: &Term| Interval::binary(Binary::Add, sum, term.over(tau));
+        self.begins_at(x).then(|| self.terms.iter().fold(Interval::constant(0.0), add))
+    }
+
+    fn begins_at(&self, x: f64) -> bool {
+        (self.start - x).abs() <= 8.0 * f64::EPSILON * x.abs()
+    }
+
     /// The rate at a time since the start.
     pub fn rate(&self, tau: f64) -> f64 {
         self.rate.iter().map(|t| t.value(tau)).sum()

@@ -128,7 +128,7 @@ impl World {
                 Some(solution) => solution.value(*component as usize, at).unwrap_or(x),
                 None => x,
             },
-            formula => x + formula.value(at.since(state.since).max(0.0)),
+            formula => formula.at(x, at.since(state.since).max(0.0)),
         }
     }
 

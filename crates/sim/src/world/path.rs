@@ -142,7 +142,7 @@ impl<'p> Path<'p> {
             out,
             |x| x,
             |piece| piece.value(position),
-            |trajectory, x, offset| x + trajectory.value(offset + tau),
+            |trajectory, x, offset| trajectory.at(x, offset + tau),
             |t| t + tau,
         );
     }
@@ -155,7 +155,7 @@ impl<'p> Path<'p> {
             Dual::constant,
             |piece| piece.departure(),
             |trajectory, x, offset| Dual {
-                value: x + trajectory.value(offset),
+                value: trajectory.at(x, offset),
                 rate: h * trajectory.rate(offset),
             },
             |t| Dual { value: t, rate: h },
@@ -175,10 +175,7 @@ impl<'p> Path<'p> {
             out,
             Interval::constant,
             |piece| piece.over(lo, hi).value,
-            |trajectory, x, offset| {
-                let value = trajectory.over(offset + lo * h, offset + hi * h).value;
-                Interval { lo: x + value.lo, hi: x + value.hi, ..value }
-            },
+            |trajectory, x, offset| trajectory.within(x, offset + lo * h, offset + hi * h).value,
             |t| Interval::spanned(t + lo * h, t + hi * h),
         );
         out.extend(self.state.switches.iter().map(|&on| Interval::constant(f64::from(u8::from(on)))));
@@ -198,9 +195,8 @@ impl<'p> Path<'p> {
             Dual::constant,
             |piece| piece.over(lo, hi),
             |trajectory, x, offset| {
-                let Dual { value, rate } = trajectory.over(offset + lo * h, offset + hi * h);
-                let shifted = Interval { lo: x + value.lo, hi: x + value.hi, ..value };
-                Dual { value: shifted, rate: Interval { lo: h * rate.lo, hi: h * rate.hi, ..rate } }
+                let Dual { value, rate } = trajectory.within(x, offset + lo * h, offset + hi * h);
+                Dual { value, rate: Interval { lo: h * rate.lo, hi: h * rate.hi, ..rate } }
             },
             |t| Dual { value: Interval::spanned(t + lo * h, t + hi * h), rate: Interval::constant(h) },
         );
@@ -247,7 +243,10 @@ impl<'p> Path<'p> {
             |piece| {
                 around(piece.value(position), piece.error_of(piece.over(0.0, position).value.magnitude()))
             },
-            |trajectory, x, offset| around(x + trajectory.value(offset + tau), ROUNDING * x.abs()),
+            |trajectory, x, offset| {
+                let value = trajectory.at(x, offset + tau);
+                around(value, ROUNDING * trajectory.rounded(x, value))
+            },
             |t| around(t + tau, 0.0),
         );
     }
@@ -307,10 +306,7 @@ impl<'p> Path<'p> {
                 let width = piece.error_of(bounds.magnitude());
                 Interval { lo: bounds.lo - width, hi: bounds.hi + width, ..bounds }
             },
-            |trajectory, x, offset| {
-                let value = trajectory.over(offset, offset + h).value;
-                Interval { lo: x + value.lo, hi: x + value.hi, ..value }
-            },
+            |trajectory, x, offset| trajectory.within(x, offset, offset + h).value,
             |t| Interval::spanned(t, t + h),
         );
     }

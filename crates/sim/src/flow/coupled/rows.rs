@@ -192,7 +192,7 @@ impl EquationTable {
             VariableSource::State(component) => y[component as usize],
             VariableSource::Formula(i) => {
                 let FormulaInput { trajectory, x, offset, .. } = &self.formulas[i as usize];
-                x + trajectory.value(offset + tau)
+                trajectory.at(*x, offset + tau)
             }
         }
     }

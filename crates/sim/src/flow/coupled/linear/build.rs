@@ -25,7 +25,7 @@ impl Unknowns {
             return Some(());
         }
         let formula = &formulas[i as usize];
-        let x = formula.x + formula.trajectory.value(formula.offset);
+        let x = formula.trajectory.at(formula.x, formula.offset);
         let (rate, decay) = match &formula.trajectory {
             Trajectory::Polynomial([c, 0.0, 0.0, 0.0]) => (*c, 0.0),
             Trajectory::Riccati(law) => (formula.trajectory.rate(formula.offset), law.exponential()?.1),
