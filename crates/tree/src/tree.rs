@@ -35,6 +35,12 @@ impl ModuleId {
         self.slot as usize
     }
 
+    /// Number of modules that have had the slot before: it tells the modules of one slot apart.
+    #[inline]
+    pub fn generation(self) -> u32 {
+        self.generation
+    }
+
     pub(super) fn of_parts(slot: u32, generation: u32) -> ModuleId {
         ModuleId { slot, generation }
     }

@@ -31,7 +31,7 @@ impl Outlook<'_> {
     /// True if it is plain that no atom changes its sign before the end, nor comes near to it.
     pub fn is_quiet(&self) -> bool {
         let Outlook { state, rule, .. } = self;
-        if self.solution.error <= 0.0 || state.next.near != 0 || !state.next.changes.is_empty() {
+        if self.solution.error <= 0.0 || state.next.near != 0 || !state.next.changes().is_empty() {
             return false;
         }
         rule.zero_crossings(state.solve).iter().enumerate().all(|(atom, crossing)| {

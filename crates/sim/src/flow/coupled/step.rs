@@ -342,14 +342,14 @@ impl FlowStage<'_, '_> {
             );
             let last = knot.since(solution.end) >= 0.0;
             let state = self.world.state_mut(id).expect("seen above");
-            state.next.changes.extend(found.changes);
+            state.next.add_changes(found.changes);
             let (before, index) = (std::mem::replace(&mut state.next.near, found.near), state.rule);
             self.detector.note_approach(index.unwrap_or(0), found.near, before, knot);
             let state = self.world.state_mut(id).expect("seen above");
             if found.event.is_some() {
                 let time = found.touched[0].time;
                 let kind = if found.in_doubt { NextKind::Doubt } else { NextKind::Event };
-                (state.next.kind, state.next.touched) = (kind, found.touched);
+                state.next.touch(kind, found.touched);
                 return self.schedule.schedule(who, time);
             }
             if last {
