@@ -68,8 +68,9 @@ impl CoupledSolution {
         self.tracks.get(component).copied().unwrap_or(whole)
     }
 
-    /// The dense output that a component follows from an instant on, and its number there.
-    fn stretch(&self, component: usize, at: SimTime) -> Option<(&Dense, usize)> {
+    /// The dense output that a component follows from an instant on, and its number there; None for one that has not been
+    /// integrated yet.
+    pub fn stretch(&self, component: usize, at: SimTime) -> Option<(&Dense, usize)> {
         let Track { first, count, component } = self.track(component);
         if count == 1 {
             return Some((&self.stretches[first as usize], component as usize));

@@ -3,6 +3,7 @@
 //! - [`World`]: the tree, the states of materialised modules, the lives of lazy ones, the solution of the coupled ones
 //! - [`state`]: rule, clause, signs, trajectories and next event of one module
 //! - [`path`]: the variables of a rule along a stretch of time
+//! - [`prefetch`]: memory that is asked for before it is read
 //! - [`context`], [`neighbours`]: the modules that a rule reads, and the modules that read one
 //! - [`life`]: lazy modules
 
@@ -12,6 +13,7 @@ pub mod life;
 pub mod neighbours;
 pub mod new_modules;
 pub mod path;
+pub mod prefetch;
 pub mod state;
 
 use crate::error::{Error, Site};

@@ -13,6 +13,7 @@ use std::collections::HashMap;
 use smallvec::SmallVec;
 
 use crate::world::World;
+use crate::world::prefetch::fetch;
 use crate::world::state::State;
 use dlsys_model::{KindId, Model};
 use dlsys_tree::{ModuleId, Tree};
@@ -237,6 +238,20 @@ impl Neighbours {
                 each(looker, &state.context);
             }
         }
+    }
+
+    /// The neighbours of a slot's module, as far as they are known.
+    pub fn beside(&self, slot: usize) -> impl Iterator<Item = ModuleId> {
+        let known = |around: &Around| [LEFT, RIGHT].map(|side| around.link(side));
+        self.around.get(slot).map(known).into_iter().flatten().filter_map(|link| match link {
+            Link::Module(id) => Some(id),
+            _ => None,
+        })
+    }
+
+    /// Prefetches what is kept in a slot.
+    pub fn prefetch(&self, slot: usize) {
+        self.around.get(slot).into_iter().for_each(fetch);
     }
 
     /// Removes the lookers of a module that has died.

@@ -76,6 +76,8 @@ pub struct Next {
     pub lasting: bool,
     /// Atoms, one bit each, whose sides are nearer each other than the error of integration.
     pub near: u64,
+    /// Some signs change before then.
+    has_changes: bool,
     /// Signs that change. Most coupled modules have none before their common step ends, and every step reads their states.
     ahead: Option<Box<Ahead>>,
 }
@@ -106,8 +108,10 @@ pub enum NextKind {
 
 impl Next {
     pub fn new(kind: NextKind, touched: SmallVec<[Change; 1]>, changes: Vec<Change>) -> Next {
-        let is_known = !touched.is_empty() || !changes.is_empty();
-        Next { kind, ahead: is_known.then(|| Box::new(Ahead { touched, changes })), ..Next::default() }
+        let has_changes = !changes.is_empty();
+        let is_known = !touched.is_empty() || has_changes;
+        let ahead = is_known.then(|| Box::new(Ahead { touched, changes }));
+        Next { kind, has_changes, ahead, ..Next::default() }
     }
 
     /// Nothing known, of a module that goes on.
@@ -117,7 +121,7 @@ impl Next {
 
     /// Forgets all, but not its memory.
     fn clear(&mut self) {
-        (self.kind, self.lasting, self.near) = (NextKind::Nothing, false, 0);
+        (self.kind, self.lasting, self.near, self.has_changes) = (NextKind::Nothing, false, 0, false);
         if let Some(ahead) = &mut self.ahead {
             ahead.touched.clear();
             ahead.changes.clear();
@@ -144,13 +148,14 @@ impl Next {
 
     /// Signs that change before then, without consequence.
     pub fn changes(&self) -> &[Change] {
-        self.ahead.as_ref().map_or(&[], |ahead| &ahead.changes)
+        self.ahead.as_ref().filter(|_| self.has_changes).map_or(&[], |ahead| &ahead.changes)
     }
 
     /// Adds such changes.
     pub fn add_changes(&mut self, changes: Vec<Change>) {
         if !changes.is_empty() {
             self.ahead.get_or_insert_default().changes.extend(changes);
+            self.has_changes = true;
         }
     }
 }
@@ -243,7 +248,10 @@ impl State {
 
     /// Takes over the signs that have changed without consequence up to an instant.
     pub fn pass_changes(&mut self, until: SimTime) {
-        let (signs, Some(ahead)) = (&mut self.signs, &mut self.next.ahead) else { return };
+        let (signs, true, Some(ahead)) = (&mut self.signs, self.next.has_changes, &mut self.next.ahead)
+        else {
+            return;
+        };
         ahead.changes.retain(|change| {
             let passed = change.time.since(until) <= 0.0;
             if passed {
@@ -251,5 +259,6 @@ impl State {
             }
             !passed
         });
+        self.next.has_changes = !ahead.changes.is_empty();
     }
 }

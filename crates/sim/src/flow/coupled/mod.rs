@@ -21,7 +21,6 @@ pub mod couple;
 pub mod equations;
 pub mod lanes;
 pub mod linear;
-pub mod prefetch;
 pub mod reintegration;
 mod repair;
 pub mod rows;

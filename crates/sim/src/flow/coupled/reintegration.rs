@@ -331,18 +331,26 @@ impl FlowStage<'_, '_> {
         components.clear();
         rings.clear();
         y.clear();
+        let mut owners: SmallVec<[(ModuleId, usize); 32]> = SmallVec::new();
         for (n, &id) in region.members.iter().enumerate() {
             if region.rings.get(rings.len()) == Some(&n) {
                 rings.push(components.len());
             }
-            let (state, values) = (self.world.state(id)?, self.world.tree.parameters(id));
+            let state = self.world.state(id)?;
             for &parameter in integrated(self.setup.model, state) {
                 if let Trajectory::Coupled(component) = state.trajectories[parameter] {
                     components.push(component);
-                    y.push(solution.value(component as usize, now).unwrap_or(values[parameter]));
+                    owners.push((id, parameter));
                 }
             }
         }
+        // One after another these would wait for memory at every step of the way.
+        let along: SmallVec<[_; 32]> =
+            components.iter().map(|c| solution.stretch(*c as usize, now)).collect();
+        y.extend(along.iter().zip(&owners).map(|(along, &(id, parameter))| match along {
+            Some((dense, component)) => dense.value(*component, dense.position(now)),
+            None => self.world.tree.parameters(id)[parameter],
+        }));
         for (number, &component) in components.iter().enumerate() {
             if numbers.len() <= component as usize {
                 numbers.resize(component as usize + 1, NOT_HERE);
@@ -354,6 +362,7 @@ impl FlowStage<'_, '_> {
         let frozen = self.setup.settings.is_sliced();
         let modules = Membership { world: &*self.world, members: &region.members, start: now, frozen };
         let is_explicit = stiff.is_none() && !control.stiff && !frozen;
+        system.clear(now);
         let is_bare = is_explicit && system.gather(rules, &modules, y.len(), number);
         if !is_bare {
             system.rebuild(rules, &modules, number);
@@ -381,7 +390,7 @@ impl FlowStage<'_, '_> {
             let mut equations = Equations::within(std::mem::take(memory), system, rules, Some(solution));
             // The start of the step moves on.
             let modules = Membership { start: from, ..modules };
-            equations.whole = is_bare.then_some(Whole { modules, components });
+            equations.whole = is_bare.then_some(Whole { modules, components: Some(components) });
             let end = Some(solution.end);
             let stats = &mut self.log.stats;
             let settings = &self.setup.coupled_settings;

@@ -6,10 +6,10 @@ use crate::detect::quiet::Outlook;
 use crate::error::Error;
 use crate::flow::FlowStage;
 use crate::flow::coupled::Coupled;
+use crate::flow::coupled::columns::Whole;
 use crate::flow::coupled::equations::Equations;
 use crate::flow::coupled::linear::Linear;
-use crate::flow::coupled::prefetch::prefetch;
-use crate::flow::coupled::system::{Membership, integrated};
+use crate::flow::coupled::system::{Membership, System, integrated};
 use crate::flow::coupled::traffic::Work;
 use crate::flow::independent::crawls;
 use crate::flow::integrator::{StepError, StepRequest};
@@ -18,6 +18,7 @@ use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::coupled_solution::CoupledSolution;
 use crate::world::path::Path;
+use crate::world::prefetch::prefetch;
 use crate::world::state::NextKind;
 use crate::{Method, Scheduler};
 use dlsys_model::Rule;
@@ -40,9 +41,6 @@ impl FlowStage<'_, '_> {
     pub fn restart_coupled(&mut self, at: SimTime) -> Result<(), Error> {
         let members = self.gather_members(at);
         self.schedule.cancel(Owner::Coupled);
-        let frozen = self.setup.settings.is_sliced();
-        let membership = Membership { world: self.world, members: &members, start: at, frozen };
-        self.flows.coupled.system.rebuild(&self.setup.model.rules, &membership, Some);
         self.flows.coupled.pulsing.clear();
         if self.setup.has_pulses && !self.setup.settings.method.is_fixed_step() {
             let pulsing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_pulse(*id)).collect();
@@ -50,7 +48,7 @@ impl FlowStage<'_, '_> {
         }
         self.flows.coupled.members = members;
         (self.flows.coupled.reintegrated, self.flows.coupled.pending) = (false, false);
-        self.choose_method();
+        self.choose_method(at);
         if self.flows.coupled.members.is_empty() {
             return Ok(());
         }
@@ -71,6 +69,7 @@ impl FlowStage<'_, '_> {
         }));
         let solution = self.world.coupled.take();
         self.flows.coupled.y.clear();
+        self.flows.coupled.system.clear(at);
         let mut count = 0;
         for n in 0..members.len() {
             prefetch(self.world, &members, n);
@@ -108,6 +107,7 @@ impl FlowStage<'_, '_> {
             tree.set_value(place, value);
             *trajectory = Trajectory::Coupled(self.flows.coupled.y.len() as u32);
             self.flows.coupled.y.push(value);
+            self.flows.coupled.system.table.places.push((place, id, parameter));
         }
         state.pass_changes(at);
         if !state.next.lasting {
@@ -116,13 +116,15 @@ impl FlowStage<'_, '_> {
         }
     }
 
-    /// Solves the equations without steps if they are linear and no event can cut their trajectory; else prepares the
-    /// integrator.
-    fn choose_method(&mut self) {
+    /// Writes the equations of the members, and solves them without steps if they are linear and no event can cut their
+    /// trajectory; else prepares the integrator.
+    fn choose_method(&mut self, at: SimTime) {
         let without_steps = self.setup.settings.method == Method::Auto
             && (self.flows.coupled.control.stiff || self.flows.coupled.cuts < MAX_CUTS)
             && !self.setup.settings.is_sliced()
             && !self.searches_coupled();
+        let is_explicit = !self.setup.settings.method.is_implicit() && !self.flows.coupled.control.stiff;
+        self.write_equations(at, without_steps || !is_explicit);
         let Coupled { system, y, integrator, linear, tried, pulsing, .. } = &mut self.flows.coupled;
         let rules = &self.setup.model.rules;
         *tried = without_steps;
@@ -135,8 +137,20 @@ impl FlowStage<'_, '_> {
             rules.iter().all(|rule| rule.atoms.is_empty()) && pulsing.is_empty() && system.algebra.is_empty();
         integrator.set_unwatched(is_unwatched);
         if linear.is_none() {
-            system.prepare_rates(rules);
+            if !system.is_bare {
+                system.prepare_rates(rules);
+            }
             integrator.restart(self.setup.settings.method, y.len());
+        }
+    }
+
+    /// Writes the equations of the members from an instant on: as columns only, where that is enough.
+    fn write_equations(&mut self, at: SimTime, with_table: bool) {
+        let (rules, frozen) = (&self.setup.model.rules, self.setup.settings.is_sliced());
+        let Coupled { system, members, y, .. } = &mut self.flows.coupled;
+        let modules = Membership { world: self.world, members, start: at, frozen };
+        if with_table || frozen || !system.gather(rules, &modules, y.len(), Some) {
+            system.rebuild(rules, &modules, Some);
         }
     }
 
@@ -153,7 +167,8 @@ impl FlowStage<'_, '_> {
     /// Makes the trajectory of the coupled modules available at an instant: the dense output of the common step, or the
     /// solution without steps.
     pub fn show_coupled(&mut self, at: SimTime) {
-        let Coupled { system, y, integrator, control, linear, pending, .. } = &mut self.flows.coupled;
+        let Coupled { system, members, y, integrator, control, linear, pending, .. } =
+            &mut self.flows.coupled;
         match linear {
             Some(linear) => {
                 if self.world.coupled.as_ref().is_none_or(|solution| solution.start() != at) {
@@ -163,7 +178,7 @@ impl FlowStage<'_, '_> {
             }
             None => {
                 if std::mem::take(pending) {
-                    let mut equations = Equations::new(system, &self.setup.model.rules, None);
+                    let mut equations = common(system, members, self.world, &self.setup.model.rules);
                     let stretches = match integrator.is_unwatched() {
                         true => integrator.refined(&mut equations, y, &self.setup.coupled_settings),
                         false => vec![integrator.dense(&mut equations, y)],
@@ -176,6 +191,11 @@ impl FlowStage<'_, '_> {
 
     /// Makes a step of the coupled modules and searches it.
     fn step_coupled(&mut self, from: SimTime) -> Result<(), Error> {
+        if self.flows.coupled.control.stiff && self.flows.coupled.system.is_bare {
+            // Implicit steps need partial derivatives.
+            self.write_equations(from, true);
+            self.flows.coupled.system.prepare_rates(&self.setup.model.rules);
+        }
         let mut may_spare = true;
         let end = loop {
             let (step, solution) = self.make_step(from, may_spare);
@@ -218,8 +238,8 @@ impl FlowStage<'_, '_> {
         self.flows.coupled.integrator.spare(spared);
         let (mut solution, mut tries) = (None, 0);
         let step = loop {
-            let Coupled { system, y, integrator, control, pulsing, .. } = &mut self.flows.coupled;
-            let mut equations = Equations::new(system, rules, None);
+            let Coupled { system, members, y, integrator, control, pulsing, .. } = &mut self.flows.coupled;
+            let mut equations = common(system, members, self.world, rules);
             let stats = &mut self.log.stats;
             let request = StepRequest { settings, y, start: from, limit };
             let step = integrator.step(request, control, &mut equations, stats);
@@ -445,6 +465,20 @@ impl FlowStage<'_, '_> {
         }
         self.step_error(error, at, owner)
     }
+}
+
+/// The equations of the common step.
+fn common<'s>(
+    system: &'s System,
+    members: &'s [ModuleId],
+    world: &'s World,
+    rules: &'s [Rule],
+) -> Equations<'s> {
+    let modules = Membership { world, members, start: system.table.start, frozen: false };
+    let whole = system.is_bare.then_some(Whole { modules, components: None });
+    let mut equations = Equations::new(system, rules, None);
+    equations.whole = whole;
+    equations
 }
 
 /// The common step of a coupled module, from an instant to the end of the coupled solution.
