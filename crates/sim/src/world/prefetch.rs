@@ -37,7 +37,7 @@ pub fn prefetch(world: &World, visited: &[ModuleId], at: usize) {
 /// Prefetches what events will read. `soon` are their modules: of the first, its state and where its neighbours are; of the
 /// others, which may come after it, where all that is.
 pub fn prefetch_events(world: &World, neighbours: &Neighbours, mut soon: impl Iterator<Item = u32>) {
-    if world.states.len() < FEW {
+    if !is_large(world) {
         return;
     }
     let locate = |slot: usize| {
@@ -51,9 +51,14 @@ pub fn prefetch_events(world: &World, neighbours: &Neighbours, mut soon: impl It
     soon.for_each(|slot| locate(slot as usize));
 }
 
+/// True if there are so many states that the caches do not hold them.
+pub fn is_large(world: &World) -> bool {
+    world.states.len() >= FEW
+}
+
 /// Prefetches all cache lines of a value.
 #[inline]
-pub(super) fn fetch<T>(value: &T) {
+pub fn fetch<T>(value: &T) {
     #[cfg(target_arch = "x86_64")]
     {
         use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

@@ -35,6 +35,7 @@ use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::CoupledSolution;
 use crate::world::neighbours::reads;
+use crate::world::prefetch::{fetch, is_large};
 use crate::world::state::{Control, State};
 use dlsys_ode::Dense;
 use dlsys_ode::Nodes;
@@ -286,6 +287,7 @@ impl FlowStage<'_, '_> {
     /// Makes the region of the seeds and `rings` rings around them.
     fn surround(&mut self, region: &mut Region, seeds: &[ModuleId], rings: usize) {
         let visit = self.flows.coupled.reintegration.begin_visit();
+        let is_large = is_large(self.world);
         let Region { members, rings: begins } = region;
         members.clear();
         begins.clear();
@@ -304,6 +306,10 @@ impl FlowStage<'_, '_> {
                     if state.coupled && state.visited != visit && reads(self.setup.model, state, seen) {
                         state.visited = visit;
                         members.push(reader);
+                        if is_large {
+                            fetch(state);
+                            self.neighbours.prefetch(reader.slot());
+                        }
                     }
                 }
             }
@@ -344,7 +350,9 @@ impl FlowStage<'_, '_> {
                 }
             }
         }
-        // One after another these would wait for memory at every step of the way.
+        if is_large(self.world) {
+            solution.prefetch(components);
+        }
         let along: SmallVec<[_; 32]> =
             components.iter().map(|c| solution.stretch(*c as usize, now)).collect();
         y.extend(along.iter().zip(&owners).map(|(along, &(id, parameter))| match along {
