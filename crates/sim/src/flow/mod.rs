@@ -179,7 +179,7 @@ impl FlowStage<'_, '_> {
         state.numeric_only = numeric_only;
         state.trajectories.clear();
         state.trajectories.extend(trajectories.iter().cloned());
-        state.window = 0.0;
+        (state.window, state.free_until) = (0.0, f64::NAN);
         if let Some(step) = &mut state.step {
             step.live = false;
         }

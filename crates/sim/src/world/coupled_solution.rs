@@ -90,8 +90,8 @@ impl CoupledSolution {
 
     /// Prefetches where these components are found, then how they move there: each of many would wait for memory three times.
     pub fn prefetch(&self, components: &[u32]) {
-        let tracks = || components.iter().filter_map(|component| self.tracks.get(*component as usize));
-        tracks().for_each(fetch);
+        components.iter().filter_map(|component| self.tracks.get(*component as usize)).for_each(fetch);
+        let tracks = || components.iter().map(|component| self.track(*component as usize));
         let found = || {
             tracks()
                 .filter(|track| track.count > 0)

@@ -177,7 +177,7 @@ impl World {
             self.tree.set_value(place, value);
         }
         let Some(state) = self.state_mut(id) else { return };
-        state.since = at;
+        (state.since, state.free_until) = (at, f64::NAN);
         for trajectory in &mut state.trajectories {
             *trajectory = Trajectory::Rest;
         }

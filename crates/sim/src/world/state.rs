@@ -34,6 +34,9 @@ pub struct State {
     pub step: Option<Box<Step>>,
     /// Length of the last stretch of formulas that was searched; 0 if none was.
     pub window: f64,
+    /// The time before which no formula of a coupled module meets a level; infinitely early if that is not known, NaN if it has
+    /// not been asked. Every step of its neighbours asks.
+    pub free_until: f64,
     /// All equations are integrated numerically, formulas or not.
     pub numeric_only: bool,
     /// It is integrated together with its neighbours.
@@ -203,6 +206,7 @@ impl State {
             trajectories: SmallVec::new(),
             step: None,
             window: 0.0,
+            free_until: f64::NAN,
             numeric_only: false,
             coupled: false,
             visited: 0,
@@ -221,7 +225,8 @@ impl State {
         self.switches.clear();
         (self.step, self.open) = (None, None);
         self.next.clear();
-        (self.window, self.numeric_only, self.coupled) = (0.0, false, false);
+        (self.window, self.free_until) = (0.0, f64::NAN);
+        (self.numeric_only, self.coupled) = (false, false);
     }
 
     /// True if some parameter is integrated by the module's own steps.

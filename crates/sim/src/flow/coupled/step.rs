@@ -334,12 +334,8 @@ impl FlowStage<'_, '_> {
         }
         self.show_coupled(from);
         let who = Owner::Module(id.slot() as u32);
-        let is_quiet = match (&self.world.coupled, self.world.state(id)) {
-            (Some(solution), Some(state)) => {
-                Outlook { world: self.world, solution, state, rule, from }.is_quiet()
-            }
-            _ => false,
-        };
+        self.ask_formulas(id, rule, from);
+        let is_quiet = self.outlook(id, rule, from).is_some_and(|outlook| outlook.is_quiet());
         // Tests search all the same, and see that nothing is found.
         if is_quiet && !cfg!(debug_assertions) {
             return self.schedule.cancel(who);
@@ -377,6 +373,20 @@ impl FlowStage<'_, '_> {
             }
             start = knot;
         }
+    }
+
+    fn outlook<'o>(&'o self, id: ModuleId, rule: &'o Rule, from: SimTime) -> Option<Outlook<'o>> {
+        let (solution, state) = (self.world.coupled.as_ref()?, self.world.state(id)?);
+        Some(Outlook { world: self.world, solution, state, rule, from })
+    }
+
+    /// Finds out how long no formula of a module meets a level, unless that has been asked since its trajectories began.
+    fn ask_formulas(&mut self, id: ModuleId, rule: &Rule, from: SimTime) {
+        let Some(outlook) = self.outlook(id, rule, from).filter(|o| o.state.free_until.is_nan()) else {
+            return;
+        };
+        let free_until = outlook.free_until();
+        self.world.state_mut(id).expect("seen above").free_until = free_until;
     }
 
     /// Advances the coupled modules to the end of their common step, and makes the next one.
