@@ -187,6 +187,12 @@ impl Tree {
         ModuleId { slot, generation: self.nodes[slot as usize].generation }
     }
 
+    /// What is read first of the module in a slot, to be fetched from memory ahead.
+    #[inline]
+    pub fn record(&self, slot: usize) -> Option<&(impl Sized + use<>)> {
+        self.nodes.get(slot)
+    }
+
     /// All that is stored of the module in a slot.
     #[inline]
     pub fn look(&self, slot: u32) -> ModuleView<'_> {

@@ -25,8 +25,9 @@ pub fn prefetch(world: &World, visited: &[ModuleId], at: usize) {
         return;
     }
     if let Some(id) = visited.get(at + 2 * AHEAD) {
-        // The pointer to the state has to be prefetched before the state.
+        // The pointer to the state has to be prefetched before the state, the place of the values before the values.
         world.states.get(id.slot()).into_iter().for_each(fetch);
+        world.tree.record(id.slot()).into_iter().for_each(fetch);
     }
     if let Some(&id) = visited.get(at + AHEAD) {
         world.states.get(id.slot()).and_then(Option::as_deref).into_iter().for_each(fetch);
