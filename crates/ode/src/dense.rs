@@ -76,8 +76,9 @@ impl Dense {
         if self.h == 0.0 { 0.0 } else { (at.since(self.start) / self.h).clamp(0.0, 1.0) }
     }
 
+    /// The Bernstein coefficients of one component.
     #[inline]
-    fn of(&self, component: usize) -> &[f64] {
+    pub fn of(&self, component: usize) -> &[f64] {
         &self.coefficients[component * (self.degree + 1)..(component + 1) * (self.degree + 1)]
     }
 

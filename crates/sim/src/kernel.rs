@@ -25,6 +25,7 @@ use super::setup::Setup;
 use super::surroundings::Link;
 use super::world::neighbours::Neighbours;
 use super::world::new_modules::{NewModules, kinds_of};
+use super::world::prefetch::prefetch_events;
 use super::world::state::NextKind;
 use super::world::{Instant, World, site_of_axiom};
 use super::{Settings, Stats, detect::Detector};
@@ -303,6 +304,7 @@ impl<'m> Simulation<'m> {
             self.check_pace(id)?;
         }
         let before = self.log.stats.events;
+        prefetch_events(&self.world, &self.neighbours, self.schedule.soon());
         self.event_stage().iterate()?;
         match oldest {
             Some(id) if self.log.stats.events == before => self.check_standstill(id),

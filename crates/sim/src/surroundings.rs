@@ -420,7 +420,7 @@ impl World {
             self.new_state(id);
         }
         let Some(state) = self.state_mut(id) else { return };
-        state.since = now;
+        (state.since, state.free_until) = (now, f64::NAN);
         state.trajectories.clear();
         state.trajectories.resize(width, Trajectory::Rest);
         for (_, parameter) in kind.read_inputs() {

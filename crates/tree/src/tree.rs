@@ -35,6 +35,12 @@ impl ModuleId {
         self.slot as usize
     }
 
+    /// Number of modules that have had the slot before: it tells the modules of one slot apart.
+    #[inline]
+    pub fn generation(self) -> u32 {
+        self.generation
+    }
+
     pub(super) fn of_parts(slot: u32, generation: u32) -> ModuleId {
         ModuleId { slot, generation }
     }
@@ -179,6 +185,12 @@ impl Tree {
     #[inline]
     pub fn id(&self, slot: u32) -> ModuleId {
         ModuleId { slot, generation: self.nodes[slot as usize].generation }
+    }
+
+    /// What is read first of the module in a slot, to be fetched from memory ahead.
+    #[inline]
+    pub fn record(&self, slot: usize) -> Option<&(impl Sized + use<>)> {
+        self.nodes.get(slot)
     }
 
     /// All that is stored of the module in a slot.

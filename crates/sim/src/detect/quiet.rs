@@ -27,23 +27,51 @@ pub struct Outlook<'w> {
     pub from: SimTime,
 }
 
+/// When a variable meets a level.
+enum Meeting {
+    Unknown,
+    Never,
+    At(SimTime),
+}
+
 impl Outlook<'_> {
     /// True if it is plain that no atom changes its sign before the end, nor comes near to it.
     pub fn is_quiet(&self) -> bool {
         let Outlook { state, rule, .. } = self;
-        if self.solution.error <= 0.0 || state.next.near != 0 || !state.next.changes.is_empty() {
+        if self.solution.error <= 0.0 || state.next.near != 0 || !state.next.changes().is_empty() {
             return false;
         }
+        let end = self.solution.end;
+        let are_formulas_free = state.free_until - end.to_f64() > 2.0 * LATER * end.resolution();
         rule.zero_crossings(state.solve).iter().enumerate().all(|(atom, crossing)| {
             is_unreachable(rule, state, atom)
                 || match location_method(crossing, state) {
                     LocationMethod::Never => true,
                     LocationMethod::Formula(variable, level) => {
-                        self.is_met_later(variable, level, state.signs[atom])
+                        are_formulas_free || self.is_met_later(variable, level, state.signs[atom])
                     }
                     LocationMethod::Search => self.keeps_clear(crossing, state.signs[atom]),
                 }
         })
+    }
+
+    /// The time before which no variable with a formula meets its level: see [`State::free_until`].
+    pub fn free_until(&self) -> f64 {
+        let Outlook { state, rule, .. } = self;
+        let atoms = rule.zero_crossings(state.solve).iter().enumerate();
+        let meetings =
+            atoms.filter(|(atom, _)| !is_unreachable(rule, state, *atom)).filter_map(|(_, crossing)| {
+                match location_method(crossing, state) {
+                    LocationMethod::Formula(variable, level) => Some(self.meeting(variable, level)),
+                    LocationMethod::Never | LocationMethod::Search => None,
+                }
+            });
+        let time = |met: Meeting| match met {
+            Meeting::Unknown => f64::NEG_INFINITY,
+            Meeting::Never => f64::INFINITY,
+            Meeting::At(time) => time.to_f64(),
+        };
+        meetings.map(time).fold(f64::INFINITY, f64::min)
     }
 
     /// True if a variable with a formula meets its level after the end, or never.
@@ -52,7 +80,17 @@ impl Outlook<'_> {
             // Such a sign is not tracked along a formula.
             return true;
         }
-        let Some(&[level]) = level.constants() else { return false };
+        let end = self.solution.end;
+        match self.meeting(variable, level) {
+            Meeting::Unknown => false,
+            Meeting::Never => true,
+            Meeting::At(met) => met.since(end) > LATER * end.resolution(),
+        }
+    }
+
+    /// The instant at which a variable with a formula meets its level.
+    fn meeting(&self, variable: usize, level: &Program) -> Meeting {
+        let Some(&[level]) = level.constants() else { return Meeting::Unknown };
         let trajectory = self.state.trajectories.get(variable);
         let start = trajectory.map_or(0.0, |_| self.world.tree.parameters(self.state.id)[variable]);
         // Near an equilibrium the rate has to be computed from the equation as written: that is for the search.
@@ -61,14 +99,13 @@ impl Outlook<'_> {
             is_known = false;
             f64::NAN
         };
-        let met = match reach(variable, self.rule.time_variable(), level, trajectory, start, exact) {
-            Some(Reach::At(time)) => time,
-            Some(Reach::Age(age)) => self.world.tree.birth(self.state.id).after(age),
-            Some(Reach::After(tau)) => self.state.since.after(tau),
-            None => return is_known,
-        };
-        let end = self.solution.end;
-        met.since(end) > LATER * end.resolution()
+        match reach(variable, self.rule.time_variable(), level, trajectory, start, exact) {
+            Some(Reach::At(time)) => Meeting::At(time),
+            Some(Reach::Age(age)) => Meeting::At(self.world.tree.birth(self.state.id).after(age)),
+            Some(Reach::After(tau)) => Meeting::At(self.state.since.after(tau)),
+            None if is_known => Meeting::Never,
+            None => Meeting::Unknown,
+        }
     }
 
     /// True if an integrated parameter keeps clear of the one level at which its atom's sides meet.

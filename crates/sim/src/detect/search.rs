@@ -93,7 +93,7 @@ impl CrossingDetector {
             return SearchResult::default();
         }
         let mut now = Signs::from_slice(&state.signs);
-        for change in &state.next.changes {
+        for change in state.next.changes() {
             now[change.atom] = change.after;
         }
         let error = path.error();

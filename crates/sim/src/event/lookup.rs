@@ -173,7 +173,7 @@ impl EventStage<'_, '_> {
         state.switches.clear();
         state.next = if state.rule == Some(rule) { state.next.again() } else { Default::default() };
         state.rule = Some(rule);
-        state.since = self.instant.at;
+        (state.since, state.free_until) = (self.instant.at, f64::NAN);
         if compiled.is_plain() {
             // Nothing to judge and nothing to choose.
             state.solve = (!compiled.solves.is_empty()).then_some(0);

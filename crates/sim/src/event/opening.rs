@@ -112,7 +112,7 @@ impl EventStage<'_, '_> {
         let state = self.world.states[slot].as_mut().expect("scheduled");
         let id = state.id;
         if state.next.kind == NextKind::Doubt {
-            let atom = state.next.touched[0].atom;
+            let atom = state.next.touched()[0].atom;
             return Err(self.flow().in_doubt(id, atom));
         }
         if state.next.kind == NextKind::Fault {
@@ -128,7 +128,7 @@ impl EventStage<'_, '_> {
             }
             return Err(error);
         }
-        let touched = std::mem::take(&mut state.next.touched);
+        let touched = state.next.take_touched();
         self.flow().learn(id);
         self.touch(id, &touched);
         Ok(id)
@@ -164,8 +164,8 @@ impl EventStage<'_, '_> {
         state.renew(id);
         (state.rule, state.solve, state.signs) = (Some(index), solve, signs);
         (state.since, state.trajectories) = (now, trajectories);
-        state.next.kind = if change.is_none() { NextKind::Nothing } else { NextKind::Event };
-        state.next.touched = change.into_iter().collect();
+        let kind = if change.is_none() { NextKind::Nothing } else { NextKind::Event };
+        state.next.touch(kind, change.into_iter().collect());
         state.restarted = self.instant.number;
         true
     }
@@ -178,10 +178,11 @@ impl EventStage<'_, '_> {
             return None;
         }
         let (id, rule) = (state.id, state.rule?);
-        if self.setup.kinds_with_context[self.world.tree.kind(id).index()] || !state.next.changes.is_empty() {
+        if self.setup.kinds_with_context[self.world.tree.kind(id).index()] || !state.next.changes().is_empty()
+        {
             return None;
         }
-        let touched = &state.next.touched;
+        let touched = state.next.touched();
         let at = |i: usize| {
             touched.iter().find(|change| change.atom == i).map_or(state.signs[i], |change| change.at)
         };

@@ -64,7 +64,7 @@ impl EventStage<'_, '_> {
         }
         // The next event, or the end of the searched stretch, is mostly far away.
         let known = match (&state.next.kind, &self.world.coupled, &state.step) {
-            (NextKind::Event, ..) => state.next.touched[0].time,
+            (NextKind::Event, ..) => state.next.touched()[0].time,
             (_, Some(solution), _) if state.coupled => solution.end,
             (_, _, Some(step)) => step.dense.end,
             _ => self.instant.at,
@@ -81,7 +81,7 @@ impl EventStage<'_, '_> {
             return None;
         }
         let mut signs = Signs::from_slice(&state.signs);
-        for change in state.next.changes.iter().filter(|change| change.time.since(self.instant.at) <= 0.0) {
+        for change in state.next.changes().iter().filter(|change| change.time.since(self.instant.at) <= 0.0) {
             signs[change.atom] = change.after;
         }
         let atom = (0..rule.atoms.len()).find(|&atom| {

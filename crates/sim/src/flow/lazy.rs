@@ -11,7 +11,7 @@ use crate::world::state::{Change, NextKind};
 use crate::world::{Instant, World};
 use dlsys_model::{Rule, Sign};
 use dlsys_tree::{ModuleId, ModuleView, NO_LABEL, SimTime};
-use smallvec::SmallVec;
+use smallvec::{SmallVec, smallvec};
 
 /// The class of a module that is born now with the parameters in `scratch`, and its event.
 pub fn classify(
@@ -126,14 +126,11 @@ pub fn materialise(
     (state.rule, state.solve, state.signs) = (Some(class.rule), class.solve, class.signs);
     (state.since, state.restarted) = (life.birth, instant.number);
     state.trajectories = life.trajectories.clone();
-    state.next.kind = NextKind::Nothing;
-    state.next.touched.clear();
     match class.end {
         Some(End::AtBirth { .. }) => state.place(false),
         Some(End::Crossing { atom, after, .. }) => {
-            state.next.kind = NextKind::Event;
             let change = Change { atom, time: life.at, at: Sign::Zero, after, level: life.level };
-            state.next.touched.push(change);
+            state.next.touch(NextKind::Event, smallvec![change]);
         }
         None => {}
     }

@@ -179,7 +179,7 @@ impl FlowStage<'_, '_> {
         state.numeric_only = numeric_only;
         state.trajectories.clear();
         state.trajectories.extend(trajectories.iter().cloned());
-        state.window = 0.0;
+        (state.window, state.free_until) = (0.0, f64::NAN);
         if let Some(step) = &mut state.step {
             step.live = false;
         }
@@ -232,7 +232,8 @@ impl FlowStage<'_, '_> {
         let state = self.world.state_mut(id).expect("seen above");
         let lasting = limit.is_infinite();
         let (near, before, index) = (found.near, state.next.near, state.rule);
-        state.next = Next { kind, touched: found.touched, changes: found.changes, lasting, near };
+        state.next = Next::new(kind, found.touched, found.changes);
+        (state.next.lasting, state.next.near) = (lasting, near);
         if kind == NextKind::Nothing {
             self.schedule.cancel(who);
         } else {
@@ -264,7 +265,7 @@ impl FlowStage<'_, '_> {
             return None;
         }
         let state = self.world.state_mut(id)?;
-        state.next = Next { kind: NextKind::Event, touched, ..Next::default() };
+        state.next = Next::new(NextKind::Event, touched, Vec::new());
         self.schedule.schedule(Owner::Module(id.slot() as u32), at);
         Some(())
     }

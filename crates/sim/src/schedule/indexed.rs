@@ -95,6 +95,15 @@ impl IndexedQueue {
         None
     }
 
+    /// Some modules whose entries come soon, the first of them first; some entries may be void.
+    pub fn soon(&self) -> impl Iterator<Item = u32> {
+        const FEW: usize = 3;
+        self.heap.as_slice().iter().take(FEW).filter_map(|entry| match entry.owner {
+            Owner::Module(slot) => Some(slot),
+            _ => None,
+        })
+    }
+
     /// All valid entries, in no order.
     pub fn valid(&self) -> impl Iterator<Item = &Entry> {
         let serial = |owner| match owner {

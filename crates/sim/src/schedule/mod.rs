@@ -238,6 +238,11 @@ impl Schedule {
         self.calendar.earliest_slot()
     }
 
+    /// Some modules with states whose entries come soon; some entries may be void.
+    pub fn soon(&self) -> impl Iterator<Item = u32> {
+        self.queue.soon()
+    }
+
     /// The time of the earliest entry that is not of a lazy module; infinite if there is none.
     pub fn earliest_other(&mut self) -> f64 {
         self.queue.peek().map_or(f64::INFINITY, |entry| entry.at.to_f64())

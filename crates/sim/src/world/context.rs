@@ -13,9 +13,17 @@ use dlsys_tree::ModuleId;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Context {
     modules: SmallVec<[ModuleId; 2]>,
-    /// Where the children of each aggregate end.
-    ends: SmallVec<[u32; 1]>,
+    /// Those behind the context; few rules have aggregates.
+    attached: Option<Box<Attached>>,
+}
+
+/// The modules behind the context: those that aggregates look at.
+#[derive(Clone, Debug, PartialEq)]
+struct Attached {
+    /// The number of modules of the context.
     context: u32,
+    /// Where the children of each aggregate end.
+    ends: SmallVec<[u32; 2]>,
 }
 
 impl Deref for Context {
@@ -38,20 +46,17 @@ impl<'a> IntoIterator for &'a Context {
 impl Context {
     pub fn clear(&mut self) {
         self.modules.clear();
-        self.ends.clear();
-        self.context = 0;
+        self.attached = None;
     }
 
     /// Adds a module of the context.
     pub fn push(&mut self, id: ModuleId) {
         self.modules.push(id);
-        self.context = self.modules.len() as u32;
     }
 
     /// Takes back all modules of the context but so many.
     pub fn truncate(&mut self, context: usize) {
         self.modules.truncate(context);
-        self.context = context as u32;
     }
 
     /// Turns round the first modules of the context.
@@ -61,19 +66,24 @@ impl Context {
 
     /// Adds the children that an aggregate looks at.
     pub fn push_children(&mut self, children: impl Iterator<Item = ModuleId>) {
+        let context = self.modules.len() as u32;
         self.modules.extend(children);
-        self.ends.push(self.modules.len() as u32);
+        let attached =
+            self.attached.get_or_insert_with(|| Box::new(Attached { context, ends: SmallVec::new() }));
+        attached.ends.push(self.modules.len() as u32);
     }
 
     /// The context alone.
     pub fn context(&self) -> &[ModuleId] {
-        &self.modules[..self.context as usize]
+        &self.modules
+            [..self.attached.as_ref().map_or(self.modules.len(), |attached| attached.context as usize)]
     }
 
     /// The children of one aggregate.
     pub fn children(&self, aggregate: usize) -> &[ModuleId] {
-        let end = |i: usize| self.ends.get(i).copied().unwrap_or(self.context) as usize;
-        let from = aggregate.checked_sub(1).map_or(self.context as usize, end);
+        let Some(Attached { context, ends }) = self.attached.as_deref() else { return &[] };
+        let end = |i: usize| ends.get(i).copied().unwrap_or(*context) as usize;
+        let from = aggregate.checked_sub(1).map_or(*context as usize, end);
         &self.modules[from..end(aggregate).max(from)]
     }
 }

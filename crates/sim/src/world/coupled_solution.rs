@@ -4,6 +4,8 @@ use dlsys_expr::{Dual, Interval};
 use dlsys_ode::{Coefficients, Dense};
 use dlsys_tree::SimTime;
 
+use crate::world::prefetch::fetch;
+
 /// The trajectory of all components from the last common step to its end.
 #[derive(Clone, Debug)]
 pub struct CoupledSolution {
@@ -68,8 +70,9 @@ impl CoupledSolution {
         self.tracks.get(component).copied().unwrap_or(whole)
     }
 
-    /// The dense output that a component follows from an instant on, and its number there.
-    fn stretch(&self, component: usize, at: SimTime) -> Option<(&Dense, usize)> {
+    /// The dense output that a component follows from an instant on, and its number there; None for one that has not been
+    /// integrated yet.
+    pub fn stretch(&self, component: usize, at: SimTime) -> Option<(&Dense, usize)> {
         let Track { first, count, component } = self.track(component);
         if count == 1 {
             return Some((&self.stretches[first as usize], component as usize));
@@ -83,6 +86,22 @@ impl CoupledSolution {
     pub fn value(&self, component: usize, at: SimTime) -> Option<f64> {
         let (dense, component) = self.stretch(component, at)?;
         Some(dense.value(component, dense.position(at)))
+    }
+
+    /// Prefetches where these components are found, then how they move there: each of many would wait for memory three times.
+    pub fn prefetch(&self, components: &[u32]) {
+        components.iter().filter_map(|component| self.tracks.get(*component as usize)).for_each(fetch);
+        let tracks = || components.iter().map(|component| self.track(*component as usize));
+        let found = || {
+            tracks()
+                .filter(|track| track.count > 0)
+                .map(|track| (track, &self.stretches[track.first as usize]))
+        };
+        found().for_each(|(_, dense)| fetch(dense));
+        found().for_each(|(track, dense)| {
+            let coefficients = dense.of(track.component as usize);
+            coefficients.first().into_iter().chain(coefficients.last()).for_each(fetch);
+        });
     }
 
     /// The end of the dense output that a component follows from an instant on.

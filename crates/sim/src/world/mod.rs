@@ -3,6 +3,7 @@
 //! - [`World`]: the tree, the states of materialised modules, the lives of lazy ones, the solution of the coupled ones
 //! - [`state`]: rule, clause, signs, trajectories and next event of one module
 //! - [`path`]: the variables of a rule along a stretch of time
+//! - [`prefetch`]: memory that is asked for before it is read
 //! - [`context`], [`neighbours`]: the modules that a rule reads, and the modules that read one
 //! - [`life`]: lazy modules
 
@@ -12,6 +13,7 @@ pub mod life;
 pub mod neighbours;
 pub mod new_modules;
 pub mod path;
+pub mod prefetch;
 pub mod state;
 
 use crate::error::{Error, Site};
@@ -175,7 +177,7 @@ impl World {
             self.tree.set_value(place, value);
         }
         let Some(state) = self.state_mut(id) else { return };
-        state.since = at;
+        (state.since, state.free_until) = (at, f64::NAN);
         for trajectory in &mut state.trajectories {
             *trajectory = Trajectory::Rest;
         }

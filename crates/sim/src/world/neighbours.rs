@@ -13,6 +13,7 @@ use std::collections::HashMap;
 use smallvec::SmallVec;
 
 use crate::world::World;
+use crate::world::prefetch::fetch;
 use crate::world::state::State;
 use dlsys_model::{KindId, Model};
 use dlsys_tree::{ModuleId, Tree};
@@ -21,9 +22,8 @@ use dlsys_tree::{ModuleId, Tree};
 const MANY: usize = 32;
 
 /// A neighbour, as far as it is known.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Link {
-    #[default]
     Unknown,
     /// There is none.
     End,
@@ -36,21 +36,65 @@ impl From<Option<ModuleId>> for Link {
     }
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct Near {
-    /// The module whose neighbours these are.
-    of: Option<ModuleId>,
-    left: Link,
-    right: Link,
+/// The sides of a module.
+const LEFT: usize = 0;
+const RIGHT: usize = 1;
+
+/// What is kept in a slot of the tree: 64 bytes, because an event reads it for all modules around it, and they are anywhere
+/// in memory.
+#[derive(Clone, Debug)]
+struct Around {
+    /// The generation of the module whose neighbours these are.
+    generation: u32,
+    /// What is known of the neighbours on both sides.
+    known: [Known; 2],
+    /// The neighbours on the sides where there are known ones.
+    neighbours: [ModuleId; 2],
+    lookers: SmallVec<[ModuleId; 4]>,
 }
 
-/// Neighbours and lookers, by slot of the tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Known {
+    Nothing,
+    End,
+    Module,
+}
+
+impl Around {
+    /// Nothing known of a module.
+    fn new(id: ModuleId) -> Around {
+        let (known, lookers) = ([Known::Nothing; 2], SmallVec::new());
+        Around { generation: id.generation(), known, neighbours: [id; 2], lookers }
+    }
+
+    /// The neighbour on one side.
+    fn link(&self, side: usize) -> Link {
+        match self.known[side] {
+            Known::Nothing => Link::Unknown,
+            Known::End => Link::End,
+            Known::Module => Link::Module(self.neighbours[side]),
+        }
+    }
+
+    fn set(&mut self, side: usize, link: Link) {
+        self.known[side] = match link {
+            Link::Unknown => Known::Nothing,
+            Link::End => Known::End,
+            Link::Module(id) => {
+                self.neighbours[side] = id;
+                Known::Module
+            }
+        };
+    }
+}
+
+/// Neighbours and lookers.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbours {
-    near: Vec<Near>,
+    /// By slot of the tree, as far as there are any.
+    around: Vec<Around>,
     /// The left neighbour, now, of the right neighbour of a module that has died at this instant.
     forwards: Forwards,
-    lookers: Vec<SmallVec<[ModuleId; 4]>>,
 }
 
 /// Links by module. Most instants concern few modules: then a list is enough.
@@ -87,29 +131,36 @@ impl Forwards {
 }
 
 impl Neighbours {
-    fn near(&mut self, id: ModuleId) -> &mut Near {
+    /// What is kept in the slot of a module, maybe of an earlier one.
+    fn slot(&mut self, id: ModuleId) -> &mut Around {
         let slot = id.slot();
-        if self.near.len() <= slot {
-            self.near.resize(slot + 1, Near::default());
+        if self.around.len() <= slot {
+            self.around.resize_with(slot + 1, || Around::new(id));
         }
-        let near = &mut self.near[slot];
-        if near.of != Some(id) {
-            *near = Near { of: Some(id), ..Near::default() };
+        &mut self.around[slot]
+    }
+
+    fn near(&mut self, id: ModuleId) -> &mut Around {
+        let near = self.slot(id);
+        if near.generation != id.generation() {
+            (near.generation, near.known) = (id.generation(), [Known::Nothing; 2]);
         }
         near
     }
 
     /// The left neighbour, as [`Tree::left`] finds it.
     pub fn left(&mut self, tree: &Tree, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
-        let known = self.near(id).left;
+        let known = self.near(id).link(LEFT);
         let left = self.forwarded(tree, known);
-        self.near(id).left = left;
+        if left != known {
+            self.near(id).set(LEFT, left);
+        }
         match left {
             Link::End => None,
             Link::Module(found) if tree.is_alive(found) => Some(found),
             _ => {
                 let found = tree.left(id, skipped);
-                self.near(id).left = found.into();
+                self.near(id).set(LEFT, found.into());
                 found
             }
         }
@@ -140,12 +191,12 @@ impl Neighbours {
 
     /// The right neighbour, as [`Tree::right`] finds it.
     pub fn right(&mut self, tree: &Tree, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
-        match self.near(id).right {
+        match self.near(id).link(RIGHT) {
             Link::End => None,
             Link::Module(found) if tree.is_alive(found) => Some(found),
             _ => {
                 let found = tree.right(id, skipped);
-                self.near(id).right = found.into();
+                self.near(id).set(RIGHT, found.into());
                 found
             }
         }
@@ -153,11 +204,7 @@ impl Neighbours {
 
     /// Remembers that a module looked at another.
     pub fn note(&mut self, tree: &Tree, looker: ModuleId, seen: ModuleId) {
-        let slot = seen.slot();
-        if self.lookers.len() <= slot {
-            self.lookers.resize(slot + 1, SmallVec::new());
-        }
-        let lookers = &mut self.lookers[slot];
+        let lookers = &mut self.slot(seen).lookers;
         if lookers.last() == Some(&looker) {
             return;
         }
@@ -172,7 +219,7 @@ impl Neighbours {
 
     /// The lookers of a slot's module, living and dead; some maybe of an earlier module.
     pub fn lookers(&self, id: ModuleId) -> &[ModuleId] {
-        self.lookers.get(id.slot()).map_or(&[], |all| all)
+        self.around.get(id.slot()).map_or(&[], |around| &around.lookers)
     }
 
     /// Calls a function with each module whose equations or conditions read something of this one that may change, and
@@ -193,16 +240,30 @@ impl Neighbours {
         }
     }
 
+    /// The neighbours of a slot's module, as far as they are known.
+    pub fn beside(&self, slot: usize) -> impl Iterator<Item = ModuleId> {
+        let known = |around: &Around| [LEFT, RIGHT].map(|side| around.link(side));
+        self.around.get(slot).map(known).into_iter().flatten().filter_map(|link| match link {
+            Link::Module(id) => Some(id),
+            _ => None,
+        })
+    }
+
+    /// Prefetches what is kept in a slot.
+    pub fn prefetch(&self, slot: usize) {
+        self.around.get(slot).into_iter().for_each(fetch);
+    }
+
     /// Removes the lookers of a module that has died.
     pub fn bury(&mut self, id: ModuleId) {
-        if let Some(lookers) = self.lookers.get_mut(id.slot()) {
-            lookers.clear();
+        if let Some(around) = self.around.get_mut(id.slot()) {
+            around.lookers.clear();
         }
     }
 
     /// Forgets all neighbours.
     pub fn forget(&mut self) {
-        self.near.clear();
+        self.around.iter_mut().for_each(|around| around.known = [Known::Nothing; 2]);
         self.end_instant();
     }
 
@@ -217,8 +278,8 @@ impl Neighbours {
     ) {
         let (left, right) = match dead {
             Some(id) => {
-                let near = *self.near(id);
-                (near.left, near.right)
+                let near = self.near(id);
+                (near.link(LEFT), near.link(RIGHT))
             }
             None => (Link::End, Link::End),
         };
@@ -232,14 +293,16 @@ impl Neighbours {
                 outer.push((before, last.take()));
             } else if kind == KindId::CLOSE {
                 if let Some(last) = last {
-                    self.near(last).right = Link::End;
+                    self.near(last).set(RIGHT, Link::End);
                 }
                 (before, last) = outer.pop().expect("brackets match: the front end saw to it");
             } else if let Some(id) = made.next() {
-                *self.near(id) = Near { of: Some(id), left: before, right: Link::Unknown };
+                let near = self.near(id);
+                near.set(LEFT, before);
+                near.set(RIGHT, Link::Unknown);
                 if !skipped(kind) {
                     if let Some(last) = last {
-                        self.near(last).right = Link::Module(id);
+                        self.near(last).set(RIGHT, Link::Module(id));
                     }
                     if outer.is_empty() {
                         first.get_or_insert(id);
@@ -249,19 +312,19 @@ impl Neighbours {
             }
         }
         if let Some(last) = last {
-            self.near(last).right = right;
+            self.near(last).set(RIGHT, right);
         }
         let Some(dead) = dead else { return };
         self.forwards.insert(dead, before);
         if let Link::Module(id) = right
-            && self.near(id).left == Link::Module(dead)
+            && self.near(id).link(LEFT) == Link::Module(dead)
         {
-            self.near(id).left = before;
+            self.near(id).set(LEFT, before);
         }
         if let Link::Module(id) = left
-            && self.near(id).right == Link::Module(dead)
+            && self.near(id).link(RIGHT) == Link::Module(dead)
         {
-            self.near(id).right = first.map_or(right, Link::Module);
+            self.near(id).set(RIGHT, first.map_or(right, Link::Module));
         }
     }
 }

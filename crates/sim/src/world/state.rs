@@ -34,6 +34,9 @@ pub struct State {
     pub step: Option<Box<Step>>,
     /// Length of the last stretch of formulas that was searched; 0 if none was.
     pub window: f64,
+    /// The time before which no formula of a coupled module meets a level; infinitely early if that is not known, NaN if it has
+    /// not been asked. Every step of its neighbours asks.
+    pub free_until: f64,
     /// All equations are integrated numerically, formulas or not.
     pub numeric_only: bool,
     /// It is integrated together with its neighbours.
@@ -72,14 +75,23 @@ pub struct Step {
 #[derive(Clone, Debug, Default)]
 pub struct Next {
     pub kind: NextKind,
-    /// Signs that are zero then.
-    pub touched: SmallVec<[Change; 1]>,
-    /// Signs that change before then, without consequence.
-    pub changes: Vec<Change>,
     /// All this follows from formulas, and holds whatever a common step brings.
     pub lasting: bool,
     /// Atoms, one bit each, whose sides are nearer each other than the error of integration.
     pub near: u64,
+    /// Some signs change before then.
+    has_changes: bool,
+    /// Signs that change. Most coupled modules have none before their common step ends, and every step reads their states.
+    ahead: Option<Box<Ahead>>,
+}
+
+/// The changes of signs up to the next entry of the schedule.
+#[derive(Clone, Debug, Default)]
+struct Ahead {
+    /// Signs that are zero then.
+    touched: SmallVec<[Change; 1]>,
+    /// Signs that change before then, without consequence.
+    changes: Vec<Change>,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -98,9 +110,56 @@ pub enum NextKind {
 }
 
 impl Next {
+    pub fn new(kind: NextKind, touched: SmallVec<[Change; 1]>, changes: Vec<Change>) -> Next {
+        let has_changes = !changes.is_empty();
+        let is_known = !touched.is_empty() || has_changes;
+        let ahead = is_known.then(|| Box::new(Ahead { touched, changes }));
+        Next { kind, has_changes, ahead, ..Next::default() }
+    }
+
     /// Nothing known, of a module that goes on.
     pub fn again(&self) -> Next {
         Next { near: self.near, ..Next::default() }
+    }
+
+    /// Forgets all, but not its memory.
+    fn clear(&mut self) {
+        (self.kind, self.lasting, self.near, self.has_changes) = (NextKind::Nothing, false, 0, false);
+        if let Some(ahead) = &mut self.ahead {
+            ahead.touched.clear();
+            ahead.changes.clear();
+        }
+    }
+
+    /// Signs that are zero then.
+    pub fn touched(&self) -> &[Change] {
+        self.ahead.as_ref().map_or(&[], |ahead| &ahead.touched)
+    }
+
+    /// Takes the signs that are zero then out.
+    pub fn take_touched(&mut self) -> SmallVec<[Change; 1]> {
+        self.ahead.as_mut().map(|ahead| std::mem::take(&mut ahead.touched)).unwrap_or_default()
+    }
+
+    /// Makes these the signs that are zero then.
+    pub fn touch(&mut self, kind: NextKind, touched: SmallVec<[Change; 1]>) {
+        self.kind = kind;
+        if !touched.is_empty() || self.ahead.is_some() {
+            self.ahead.get_or_insert_default().touched = touched;
+        }
+    }
+
+    /// Signs that change before then, without consequence.
+    pub fn changes(&self) -> &[Change] {
+        self.ahead.as_ref().filter(|_| self.has_changes).map_or(&[], |ahead| &ahead.changes)
+    }
+
+    /// Adds such changes.
+    pub fn add_changes(&mut self, changes: Vec<Change>) {
+        if !changes.is_empty() {
+            self.ahead.get_or_insert_default().changes.extend(changes);
+            self.has_changes = true;
+        }
     }
 }
 
@@ -147,6 +206,7 @@ impl State {
             trajectories: SmallVec::new(),
             step: None,
             window: 0.0,
+            free_until: f64::NAN,
             numeric_only: false,
             coupled: false,
             visited: 0,
@@ -164,9 +224,9 @@ impl State {
         self.context.clear();
         self.switches.clear();
         (self.step, self.open) = (None, None);
-        self.next.changes.clear();
-        (self.next.lasting, self.next.near) = (false, 0);
-        (self.window, self.numeric_only, self.coupled) = (0.0, false, false);
+        self.next.clear();
+        (self.window, self.free_until) = (0.0, f64::NAN);
+        (self.numeric_only, self.coupled) = (false, false);
     }
 
     /// True if some parameter is integrated by the module's own steps.
@@ -193,13 +253,17 @@ impl State {
 
     /// Takes over the signs that have changed without consequence up to an instant.
     pub fn pass_changes(&mut self, until: SimTime) {
-        let signs = &mut self.signs;
-        self.next.changes.retain(|change| {
+        let (signs, true, Some(ahead)) = (&mut self.signs, self.next.has_changes, &mut self.next.ahead)
+        else {
+            return;
+        };
+        ahead.changes.retain(|change| {
             let passed = change.time.since(until) <= 0.0;
             if passed {
                 signs[change.atom] = change.after;
             }
             !passed
         });
+        self.next.has_changes = !ahead.changes.is_empty();
     }
 }

@@ -1,31 +1,37 @@
-//! The equations of a few modules as columns only, made from their states without a table of rows: a region is integrated
-//! once, for an event, and a table of it would take as long to make as its steps.
+//! The equations of modules as columns only, made from their states without a table of rows. A region is integrated once, for
+//! an event, and a table of it would take as long to make as its steps; that of the common step would be the largest part
+//! of what is kept of a coupled module.
 //!
 //! That is enough for explicit steps of integrated components. What partial derivatives need ([`Whole`]) is made when they
 //! are asked for, which is when steps fail again and again.
 
 use crate::flow::coupled::equations::Equations;
 use crate::flow::coupled::lanes::{LaneColumn, ProgramKey};
-use crate::flow::coupled::system::{Membership, System};
+use crate::flow::coupled::rows::VariableSource;
+use crate::flow::coupled::system::{Membership, REGION, System};
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::CoupledSolution;
+use crate::world::prefetch::prefetch;
 use crate::world::state::State;
 use dlsys_expr::LANES;
 use dlsys_model::{Rule, Solve};
 use smallvec::SmallVec;
 
-/// The modules of a region and the components of the coupled solution that are integrated there, in order: what a table of
-/// its equations is made of.
+/// What a table of equations is made of: the modules, and of a region the components of the coupled solution that are
+/// integrated there, in order. None for all of them, as they are numbered.
 #[derive(Clone, Copy)]
 pub struct Whole<'r> {
     pub modules: Membership<'r>,
-    pub components: &'r [u32],
+    pub components: Option<&'r [u32]>,
 }
 
 impl Whole<'_> {
     /// The equations with their table.
     pub fn system(&self, rules: &[Rule]) -> System {
-        let number = |of: u32| self.components.iter().position(|c| *c == of).map(|number| number as u32);
+        let number = |of: u32| match self.components {
+            Some(components) => components.iter().position(|c| *c == of).map(|number| number as u32),
+            None => Some(of),
+        };
         let mut system = System::default();
         system.rebuild(rules, &self.modules, number);
         system.prepare_rates(rules);
@@ -44,7 +50,10 @@ impl Whole<'_> {
 }
 
 /// A module with rates, and the number of the first of them.
-type Row<'w> = (ProgramKey, &'w State, u32);
+type Row<'w> = (&'w State, u32);
+
+/// Rows with the same program that wait for others, to fill the lanes.
+type Waiting<'w> = (ProgramKey, SmallVec<[Row<'w>; LANES]>);
 
 /// True if columns say all that explicit steps need of a clause: neither aggregates, nor the age of the module, nor
 /// components that are solved for.
@@ -56,7 +65,7 @@ fn is_plain(rule: &Rule, clause: &Solve, numeric_only: bool) -> bool {
 }
 
 impl System {
-    /// Makes these the equations of some of the coupled modules, with `components` components in all, as columns only; see
+    /// Adds to no equations those of some of the coupled modules, with `components` components in all, as columns only; see
     /// [`System::rebuild`]. False if the equations of some module need the table.
     pub fn gather(
         &mut self,
@@ -65,36 +74,37 @@ impl System {
         components: usize,
         unknown: impl Fn(u32) -> Option<u32>,
     ) -> bool {
-        self.clear(modules.start);
-        let mut rows: SmallVec<[Row; 64]> = SmallVec::new();
-        for &id in modules.members {
+        self.is_bare = true;
+        let mut waiting: SmallVec<[Waiting; 2]> = SmallVec::new();
+        for (at, &id) in modules.members.iter().enumerate() {
+            if modules.members.len() > REGION {
+                prefetch(modules.world, modules.members, at);
+            }
             let state = modules.world.state(id).expect("members have states");
             let (Some(rule), Some(solve)) = (state.rule, state.solve) else { continue };
             let clause = &rules[rule].solves[solve];
             let key = ProgramKey { rule, solve, numeric_only: state.numeric_only };
-            let is_known = rows.last().is_some_and(|(last, ..)| *last == key);
-            if !is_known && !is_plain(&rules[rule], clause, state.numeric_only) {
-                return false;
+            let place = waiting.iter().position(|(known, _)| *known == key).unwrap_or(waiting.len());
+            if place == waiting.len() {
+                if !is_plain(&rules[rule], clause, state.numeric_only) {
+                    return false;
+                }
+                self.table.timed |= clause.stepping.is_timed();
+                waiting.push((key, SmallVec::new()));
             }
-            self.table.timed |= clause.stepping.is_timed();
             let first = clause.stepping.components(state.numeric_only).first();
             if let Some(Trajectory::Coupled(component)) = first.and_then(|p| state.trajectories.get(*p)) {
-                rows.push((key, state, unknown(*component).expect("a component of a member")));
+                self.modules += 1;
+                let rows = &mut waiting[place].1;
+                rows.push((state, unknown(*component).expect("a component of a member")));
+                if rows.len() == LANES {
+                    self.gather_chunk(rules, modules, (key, rows), (components, &unknown));
+                    rows.clear();
+                }
             }
         }
-        self.modules = rows.len() as u64;
-        let mut keys: SmallVec<[ProgramKey; 4]> = SmallVec::new();
-        for (key, ..) in &rows {
-            if !keys.contains(key) {
-                keys.push(*key);
-            }
-        }
-        for key in keys {
-            let mut same = rows.iter().filter(|row| row.0 == key).peekable();
-            while same.peek().is_some() {
-                let few: SmallVec<[&Row; LANES]> = same.by_ref().take(LANES).collect();
-                self.gather_chunk(rules, modules, &few, (components, &unknown));
-            }
+        for (key, rows) in waiting.iter().filter(|(_, rows)| !rows.is_empty()) {
+            self.gather_chunk(rules, modules, (*key, rows), (components, &unknown));
         }
         true
     }
@@ -104,10 +114,10 @@ impl System {
         &mut self,
         rules: &[Rule],
         modules: &Membership,
-        rows: &[&Row],
+        (key, rows): (ProgramKey, &[Row]),
         (components, unknown): (usize, &impl Fn(u32) -> Option<u32>),
     ) {
-        let (world, key) = (modules.world, rows[0].0);
+        let world = modules.world;
         let (rule, clause) = (&rules[key.rule], &rules[key.rule].solves[key.solve]);
         let (time, switches) = (rule.time_variable(), rule.variables);
         self.lanes.begin_chunk();
@@ -115,12 +125,12 @@ impl System {
             let column = if variable == time {
                 LaneColumn::Time
             } else if let Some(switch) = variable.checked_sub(switches) {
-                self.lanes.numbers(rows.iter().map(|row| f64::from(u8::from(row.1.switches[switch]))))
+                self.lanes.numbers(rows.iter().map(|row| f64::from(u8::from(row.0.switches[switch]))))
             } else {
                 let mut reads = clause.stepping.reads(key.numeric_only).iter();
                 let read = reads.find(|read| read.variable == variable).expect("all that steps read");
-                let first = self.table.sources.len();
-                for (_, state, _) in rows {
+                let mut sources: SmallVec<[VariableSource; LANES]> = SmallVec::new();
+                for (state, _) in rows {
                     let (module, moves) = match read.neighbour {
                         None => (state.id, Some(*state)),
                         Some(n) => {
@@ -129,15 +139,13 @@ impl System {
                         }
                     };
                     let x = || world.tree.parameters(module)[read.parameter];
-                    let source = self.table.source(moves, read.parameter, x, unknown);
-                    self.table.sources.push(source);
+                    sources.push(self.table.source(moves, read.parameter, x, unknown));
                 }
-                let sources = &self.table.sources[first..];
-                self.lanes.column(components, sources)
+                self.lanes.column(components, &sources)
             };
             self.lanes.push_column(variable, column);
         }
-        let registers = switches + rows[0].1.switches.len();
-        self.lanes.end_chunk(key, registers, rows.iter().map(|row| row.2));
+        let registers = switches + rows[0].0.switches.len();
+        self.lanes.end_chunk(key, registers, rows.iter().map(|row| row.1));
     }
 }

@@ -6,10 +6,10 @@
 //!
 //! ```text
 //! couple ─▶ which modules are coupled ─▶ reintegration   the modules around an event, to the end of the common step
-//!                                     └▶ step            a new common step ─▶ detect ─▶ schedule
+//!                                     └▶ restart ─▶ step  a new common step ─▶ detect ─▶ schedule
 //!                                        step ─▶ repair   stiff members that the step does not resolve
 //! system ─▶ rows (table of equations) ─▶ algebra, lanes, aggregates ─▶ equations (right-hand side) ─▶ integrator
-//! columns ─▶ the equations of a region without a table
+//! columns ─▶ the equations of explicit steps without a table
 //! linear ─▶ exponentials of matrices in place of steps
 //! ```
 
@@ -21,9 +21,9 @@ pub mod couple;
 pub mod equations;
 pub mod lanes;
 pub mod linear;
-pub mod prefetch;
 pub mod reintegration;
 mod repair;
+mod restart;
 pub mod rows;
 mod step;
 pub mod system;

@@ -35,6 +35,7 @@ use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::CoupledSolution;
 use crate::world::neighbours::reads;
+use crate::world::prefetch::{fetch, is_large};
 use crate::world::state::{Control, State};
 use dlsys_ode::Dense;
 use dlsys_ode::Nodes;
@@ -286,6 +287,7 @@ impl FlowStage<'_, '_> {
     /// Makes the region of the seeds and `rings` rings around them.
     fn surround(&mut self, region: &mut Region, seeds: &[ModuleId], rings: usize) {
         let visit = self.flows.coupled.reintegration.begin_visit();
+        let is_large = is_large(self.world);
         let Region { members, rings: begins } = region;
         members.clear();
         begins.clear();
@@ -304,6 +306,10 @@ impl FlowStage<'_, '_> {
                     if state.coupled && state.visited != visit && reads(self.setup.model, state, seen) {
                         state.visited = visit;
                         members.push(reader);
+                        if is_large {
+                            fetch(state);
+                            self.neighbours.prefetch(reader.slot());
+                        }
                     }
                 }
             }
@@ -331,18 +337,28 @@ impl FlowStage<'_, '_> {
         components.clear();
         rings.clear();
         y.clear();
+        let mut owners: SmallVec<[(ModuleId, usize); 32]> = SmallVec::new();
         for (n, &id) in region.members.iter().enumerate() {
             if region.rings.get(rings.len()) == Some(&n) {
                 rings.push(components.len());
             }
-            let (state, values) = (self.world.state(id)?, self.world.tree.parameters(id));
+            let state = self.world.state(id)?;
             for &parameter in integrated(self.setup.model, state) {
                 if let Trajectory::Coupled(component) = state.trajectories[parameter] {
                     components.push(component);
-                    y.push(solution.value(component as usize, now).unwrap_or(values[parameter]));
+                    owners.push((id, parameter));
                 }
             }
         }
+        if is_large(self.world) {
+            solution.prefetch(components);
+        }
+        let along: SmallVec<[_; 32]> =
+            components.iter().map(|c| solution.stretch(*c as usize, now)).collect();
+        y.extend(along.iter().zip(&owners).map(|(along, &(id, parameter))| match along {
+            Some((dense, component)) => dense.value(*component, dense.position(now)),
+            None => self.world.tree.parameters(id)[parameter],
+        }));
         for (number, &component) in components.iter().enumerate() {
             if numbers.len() <= component as usize {
                 numbers.resize(component as usize + 1, NOT_HERE);
@@ -354,6 +370,7 @@ impl FlowStage<'_, '_> {
         let frozen = self.setup.settings.is_sliced();
         let modules = Membership { world: &*self.world, members: &region.members, start: now, frozen };
         let is_explicit = stiff.is_none() && !control.stiff && !frozen;
+        system.clear(now);
         let is_bare = is_explicit && system.gather(rules, &modules, y.len(), number);
         if !is_bare {
             system.rebuild(rules, &modules, number);
@@ -381,7 +398,7 @@ impl FlowStage<'_, '_> {
             let mut equations = Equations::within(std::mem::take(memory), system, rules, Some(solution));
             // The start of the step moves on.
             let modules = Membership { start: from, ..modules };
-            equations.whole = is_bare.then_some(Whole { modules, components });
+            equations.whole = is_bare.then_some(Whole { modules, components: Some(components) });
             let end = Some(solution.end);
             let stats = &mut self.log.stats;
             let settings = &self.setup.coupled_settings;

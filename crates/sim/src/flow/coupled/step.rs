@@ -1,4 +1,4 @@
-//! The common step of the coupled modules: its start, its steps, and the search for the next event of each member.
+//! The common step of the coupled modules, and the search for the next event of each member.
 
 use crate::detect::crossing::needs_search;
 use crate::detect::pulse::{ExaminedStep, MAX_UNBOUNDED, PulseFinding};
@@ -6,162 +6,37 @@ use crate::detect::quiet::Outlook;
 use crate::error::Error;
 use crate::flow::FlowStage;
 use crate::flow::coupled::Coupled;
+use crate::flow::coupled::columns::Whole;
 use crate::flow::coupled::equations::Equations;
-use crate::flow::coupled::linear::Linear;
-use crate::flow::coupled::prefetch::prefetch;
-use crate::flow::coupled::system::{Membership, integrated};
+use crate::flow::coupled::system::{Membership, System};
 use crate::flow::coupled::traffic::Work;
 use crate::flow::independent::crawls;
 use crate::flow::integrator::{StepError, StepRequest};
 use crate::schedule::Owner;
-use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::coupled_solution::CoupledSolution;
 use crate::world::path::Path;
+use crate::world::prefetch::prefetch;
 use crate::world::state::NextKind;
 use crate::{Method, Scheduler};
 use dlsys_model::Rule;
-use dlsys_tree::{ModuleId, SimTime, Visit};
+use dlsys_tree::{ModuleId, SimTime};
 
 /// Most times that a step is tried whose algebraic components cannot be followed, or whose rates may have pulses.
 const MAX_TRIES: usize = 100;
 
-/// A solution without steps begins anew, for all modules, at every event; after this many events steps are made.
-const MAX_CUTS: u32 = 2;
-
 /// The part of a common step's length that is tried where too many members would have to be integrated again.
 const SHORTER: f64 = 0.25;
-
-/// A common step of so many components, in units of [`Settings::threads_from`](crate::Settings::threads_from), is shared by threads: they begin anew for
-/// each stage.
-const LARGE: usize = 4;
 
 /// A common step: its end, and its dense output if that has been computed.
 type CommonStep = (Result<SimTime, StepError>, Option<CoupledSolution>);
 
 impl FlowStage<'_, '_> {
-    /// Begins the common trajectory of the coupled modules at an instant.
-    pub fn restart_coupled(&mut self, at: SimTime) -> Result<(), Error> {
-        let members = self.gather_members(at);
-        self.schedule.cancel(Owner::Coupled);
-        let frozen = self.setup.settings.is_sliced();
-        let membership = Membership { world: self.world, members: &members, start: at, frozen };
-        self.flows.coupled.system.rebuild(&self.setup.model.rules, &membership, Some);
-        self.flows.coupled.pulsing.clear();
-        if self.setup.has_pulses && !self.setup.settings.method.is_fixed_step() {
-            let pulsing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_pulse(*id)).collect();
-            self.flows.coupled.pulsing = pulsing;
-        }
-        self.flows.coupled.members = members;
-        (self.flows.coupled.reintegrated, self.flows.coupled.pending) = (false, false);
-        self.choose_method();
-        if self.flows.coupled.members.is_empty() {
-            return Ok(());
-        }
-        if self.flows.coupled.linear.is_some() {
-            self.show_coupled(at);
-            return Ok(());
-        }
-        self.step_coupled(at)
-    }
-
-    /// The coupled modules in string order. Their present values become those of the tree and of the state vector.
-    fn gather_members(&mut self, at: SimTime) -> Vec<ModuleId> {
-        let mut members = std::mem::take(&mut self.flows.coupled.members);
-        members.clear();
-        members.extend(self.world.tree.walk().filter_map(|visit| match visit {
-            Visit::Module(id) if matches!(self.world.states.get(id.slot()), Some(Some(_))) => Some(id),
-            _ => None,
-        }));
-        let solution = self.world.coupled.take();
-        self.flows.coupled.y.clear();
-        let mut count = 0;
-        for n in 0..members.len() {
-            prefetch(self.world, &members, n);
-            let id = members[n];
-            if self.world.state(id).is_none_or(|s| !s.coupled) {
-                continue;
-            }
-            members[count] = id;
-            count += 1;
-            self.gather_member(id, solution.as_ref(), at);
-        }
-        members.truncate(count);
-        members
-    }
-
-    /// Makes the present values of a module's components those of the tree, and appends them to the state vector.
-    #[inline]
-    fn gather_member(&mut self, id: ModuleId, solution: Option<&CoupledSolution>, at: SimTime) {
-        let World { tree, states, .. } = &mut *self.world;
-        let state = states[id.slot()].as_mut().expect("a member");
-        let first = tree.places(id).start;
-        for &parameter in integrated(self.setup.model, state) {
-            let trajectory = &mut state.trajectories[parameter];
-            let value = match *trajectory {
-                Trajectory::Coupled(component) => solution.and_then(|c| c.value(component as usize, at)),
-                Trajectory::Step(component) => state
-                    .step
-                    .as_ref()
-                    .filter(|step| step.live)
-                    .map(|step| step.dense.value(component as usize, step.dense.position(at))),
-                _ => None,
-            };
-            let place = first + parameter;
-            let value = value.unwrap_or(tree.values()[place]);
-            tree.set_value(place, value);
-            *trajectory = Trajectory::Coupled(self.flows.coupled.y.len() as u32);
-            self.flows.coupled.y.push(value);
-        }
-        state.pass_changes(at);
-        if !state.next.lasting {
-            state.next = state.next.again();
-            self.schedule.cancel(Owner::Module(id.slot() as u32));
-        }
-    }
-
-    /// Solves the equations without steps if they are linear and no event can cut their trajectory; else prepares the
-    /// integrator.
-    fn choose_method(&mut self) {
-        let without_steps = self.setup.settings.method == Method::Auto
-            && (self.flows.coupled.control.stiff || self.flows.coupled.cuts < MAX_CUTS)
-            && !self.setup.settings.is_sliced()
-            && !self.searches_coupled();
-        let Coupled { system, y, integrator, linear, tried, pulsing, .. } = &mut self.flows.coupled;
-        let rules = &self.setup.model.rules;
-        *tried = without_steps;
-        *linear = (without_steps)
-            .then(|| Linear::new(system, rules, y, self.setup.coupled_settings.tolerance))
-            .flatten();
-        // After each step all members are searched.
-        integrator.expect_high_overhead();
-        let is_unwatched =
-            rules.iter().all(|rule| rule.atoms.is_empty()) && pulsing.is_empty() && system.algebra.is_empty();
-        integrator.set_unwatched(is_unwatched);
-        if linear.is_none() {
-            system.prepare_rates(rules);
-            let settings = &self.setup.settings;
-            let threads = if y.len() < LARGE * settings.threads_from { 1 } else { settings.threads };
-            system.lanes.share(threads);
-            integrator.set_threads(threads);
-            integrator.restart(settings.method, y.len());
-        }
-    }
-
-    /// True if some condition of the coupled modules can only be found by searching their common trajectory.
-    fn searches_coupled(&self) -> bool {
-        self.flows.coupled.members.iter().any(|id| self.has_conditions(*id))
-    }
-
-    fn has_conditions(&self, id: ModuleId) -> bool {
-        let rule = self.world.state(id).and_then(|s| s.rule);
-        rule.is_some_and(|r| !self.setup.model.rules[r].atoms.is_empty())
-    }
-
     /// Makes the trajectory of the coupled modules available at an instant: the dense output of the common step, or the
     /// solution without steps.
     pub fn show_coupled(&mut self, at: SimTime) {
-        let Coupled { system, y, integrator, control, linear, pending, .. } = &mut self.flows.coupled;
+        let Coupled { system, members, y, integrator, control, linear, pending, .. } =
+            &mut self.flows.coupled;
         match linear {
             Some(linear) => {
                 if self.world.coupled.as_ref().is_none_or(|solution| solution.start() != at) {
@@ -171,7 +46,7 @@ impl FlowStage<'_, '_> {
             }
             None => {
                 if std::mem::take(pending) {
-                    let mut equations = Equations::new(system, &self.setup.model.rules, None);
+                    let mut equations = common(system, members, self.world, &self.setup.model.rules);
                     let stretches = match integrator.is_unwatched() {
                         true => integrator.refined(&mut equations, y, &self.setup.coupled_settings),
                         false => vec![integrator.dense(&mut equations, y)],
@@ -183,7 +58,12 @@ impl FlowStage<'_, '_> {
     }
 
     /// Makes a step of the coupled modules and searches it.
-    fn step_coupled(&mut self, from: SimTime) -> Result<(), Error> {
+    pub(super) fn step_coupled(&mut self, from: SimTime) -> Result<(), Error> {
+        if self.flows.coupled.control.stiff && self.flows.coupled.system.is_bare {
+            // Implicit steps need partial derivatives.
+            self.write_equations(from, true);
+            self.flows.coupled.system.prepare_rates(&self.setup.model.rules);
+        }
         let mut may_spare = true;
         let end = loop {
             let (step, solution) = self.make_step(from, may_spare);
@@ -226,8 +106,8 @@ impl FlowStage<'_, '_> {
         self.flows.coupled.integrator.spare(spared);
         let (mut solution, mut tries) = (None, 0);
         let step = loop {
-            let Coupled { system, y, integrator, control, pulsing, .. } = &mut self.flows.coupled;
-            let mut equations = Equations::new(system, rules, None);
+            let Coupled { system, members, y, integrator, control, pulsing, .. } = &mut self.flows.coupled;
+            let mut equations = common(system, members, self.world, rules);
             let stats = &mut self.log.stats;
             let request = StepRequest { settings, y, start: from, limit };
             let step = integrator.step(request, control, &mut equations, stats);
@@ -322,12 +202,8 @@ impl FlowStage<'_, '_> {
         }
         self.show_coupled(from);
         let who = Owner::Module(id.slot() as u32);
-        let is_quiet = match (&self.world.coupled, self.world.state(id)) {
-            (Some(solution), Some(state)) => {
-                Outlook { world: self.world, solution, state, rule, from }.is_quiet()
-            }
-            _ => false,
-        };
+        self.ask_formulas(id, rule, from);
+        let is_quiet = self.outlook(id, rule, from).is_some_and(|outlook| outlook.is_quiet());
         // Tests search all the same, and see that nothing is found.
         if is_quiet && !cfg!(debug_assertions) {
             return self.schedule.cancel(who);
@@ -350,14 +226,14 @@ impl FlowStage<'_, '_> {
             );
             let last = knot.since(solution.end) >= 0.0;
             let state = self.world.state_mut(id).expect("seen above");
-            state.next.changes.extend(found.changes);
+            state.next.add_changes(found.changes);
             let (before, index) = (std::mem::replace(&mut state.next.near, found.near), state.rule);
             self.detector.note_approach(index.unwrap_or(0), found.near, before, knot);
             let state = self.world.state_mut(id).expect("seen above");
             if found.event.is_some() {
                 let time = found.touched[0].time;
                 let kind = if found.in_doubt { NextKind::Doubt } else { NextKind::Event };
-                (state.next.kind, state.next.touched) = (kind, found.touched);
+                state.next.touch(kind, found.touched);
                 return self.schedule.schedule(who, time);
             }
             if last {
@@ -365,6 +241,20 @@ impl FlowStage<'_, '_> {
             }
             start = knot;
         }
+    }
+
+    fn outlook<'o>(&'o self, id: ModuleId, rule: &'o Rule, from: SimTime) -> Option<Outlook<'o>> {
+        let (solution, state) = (self.world.coupled.as_ref()?, self.world.state(id)?);
+        Some(Outlook { world: self.world, solution, state, rule, from })
+    }
+
+    /// Finds out how long no formula of a module meets a level, unless that has been asked since its trajectories began.
+    fn ask_formulas(&mut self, id: ModuleId, rule: &Rule, from: SimTime) {
+        let Some(outlook) = self.outlook(id, rule, from).filter(|o| o.state.free_until.is_nan()) else {
+            return;
+        };
+        let free_until = outlook.free_until();
+        self.world.state_mut(id).expect("seen above").free_until = free_until;
     }
 
     /// Advances the coupled modules to the end of their common step, and makes the next one.
@@ -421,7 +311,7 @@ impl FlowStage<'_, '_> {
     }
 
     /// True if some rate of a module may have pulses.
-    fn may_pulse(&self, id: ModuleId) -> bool {
+    pub(super) fn may_pulse(&self, id: ModuleId) -> bool {
         let clause =
             self.world.state(id).and_then(|s| Some(&self.setup.model.rules[s.rule?].solves[s.solve?]));
         clause.is_some_and(|solve| !solve.pulses.is_empty())
@@ -453,6 +343,20 @@ impl FlowStage<'_, '_> {
         }
         self.step_error(error, at, owner)
     }
+}
+
+/// The equations of the common step.
+fn common<'s>(
+    system: &'s System,
+    members: &'s [ModuleId],
+    world: &'s World,
+    rules: &'s [Rule],
+) -> Equations<'s> {
+    let modules = Membership { world, members, start: system.table.start, frozen: false };
+    let whole = system.is_bare.then_some(Whole { modules, components: None });
+    let mut equations = Equations::new(system, rules, None);
+    equations.whole = whole;
+    equations
 }
 
 /// The common step of a coupled module, from an instant to the end of the coupled solution.

@@ -3,10 +3,10 @@
 use crate::flow::coupled::aggregates::{Partial, TermBatch};
 use crate::flow::coupled::algebra::Algebra;
 use crate::flow::coupled::lanes::LaneBatches;
-use crate::flow::coupled::prefetch::prefetch;
 use crate::flow::coupled::rows::{EquationRow, EquationTable, FormulaInput, RowAggregate, VariableSource};
 use crate::trajectory::Trajectory;
 use crate::world::World;
+use crate::world::prefetch::prefetch;
 use crate::world::state::State;
 use dlsys_model::{Model, Rule, Solve};
 use dlsys_tree::{ModuleId, SimTime};
@@ -25,10 +25,12 @@ pub struct System {
     pub terms: Vec<TermBatch>,
     /// The number of modules with equations.
     pub modules: u64,
+    /// The rates are there in batches only, the table has no rows.
+    pub is_bare: bool,
 }
 
 /// More modules than this are not likely to be in the processor's caches.
-const REGION: usize = 256;
+pub(super) const REGION: usize = 256;
 
 /// The modules whose equations form a system.
 #[derive(Clone, Copy)]
@@ -57,6 +59,7 @@ impl System {
     /// integrated here. Rates can be evaluated after [`System::prepare_rates`].
     pub fn rebuild(&mut self, rules: &[Rule], modules: &Membership, unknown: impl Fn(u32) -> Option<u32>) {
         self.table.clear(modules.start);
+        self.is_bare = false;
         for (at, &id) in modules.members.iter().enumerate() {
             // The modules of a region have just been visited.
             if modules.members.len() > REGION {

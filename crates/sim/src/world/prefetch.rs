@@ -1,9 +1,10 @@
-//! Prefetching of memory that a traversal of modules will read soon.
+//! Prefetching of memory that a traversal of modules, or the next event, will read soon.
 //!
-//! The states of modules stand in memory in the order of their birth, and a common step visits them in string order:
-//! for the processor, at random. Without prefetching each visit waits for memory.
+//! The states of modules stand in memory in the order of their birth, and a common step visits them in string order, events
+//! in the order of time: for the processor, at random. Without prefetching each visit waits for memory.
 
 use crate::world::World;
+use crate::world::neighbours::Neighbours;
 use dlsys_tree::ModuleId;
 
 /// Memory is prefetched this many modules ahead.
@@ -24,8 +25,9 @@ pub fn prefetch(world: &World, visited: &[ModuleId], at: usize) {
         return;
     }
     if let Some(id) = visited.get(at + 2 * AHEAD) {
-        // The pointer to the state has to be prefetched before the state.
+        // The pointer to the state has to be prefetched before the state, the place of the values before the values.
         world.states.get(id.slot()).into_iter().for_each(fetch);
+        world.tree.record(id.slot()).into_iter().for_each(fetch);
     }
     if let Some(&id) = visited.get(at + AHEAD) {
         world.states.get(id.slot()).and_then(Option::as_deref).into_iter().for_each(fetch);
@@ -33,9 +35,31 @@ pub fn prefetch(world: &World, visited: &[ModuleId], at: usize) {
     }
 }
 
+/// Prefetches what events will read. `soon` are their modules: of the first, its state and where its neighbours are; of the
+/// others, which may come after it, where all that is.
+pub fn prefetch_events(world: &World, neighbours: &Neighbours, mut soon: impl Iterator<Item = u32>) {
+    if !is_large(world) {
+        return;
+    }
+    let locate = |slot: usize| {
+        world.states.get(slot).into_iter().for_each(fetch);
+        neighbours.prefetch(slot);
+    };
+    if let Some(next) = soon.next() {
+        world.states.get(next as usize).and_then(Option::as_deref).into_iter().for_each(fetch);
+        neighbours.beside(next as usize).for_each(|id| locate(id.slot()));
+    }
+    soon.for_each(|slot| locate(slot as usize));
+}
+
+/// True if there are so many states that the caches do not hold them.
+pub fn is_large(world: &World) -> bool {
+    world.states.len() >= FEW
+}
+
 /// Prefetches all cache lines of a value.
 #[inline]
-fn fetch<T>(value: &T) {
+pub fn fetch<T>(value: &T) {
     #[cfg(target_arch = "x86_64")]
     {
         use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

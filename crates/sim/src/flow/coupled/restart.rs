@@ -1,0 +1,154 @@
+//! The start of the common trajectory of the coupled modules: who they are, their values, their equations, and the method.
+
+use crate::Method;
+use crate::error::Error;
+use crate::flow::FlowStage;
+use crate::flow::coupled::Coupled;
+use crate::flow::coupled::linear::Linear;
+use crate::flow::coupled::system::{Membership, integrated};
+use crate::schedule::Owner;
+use crate::trajectory::Trajectory;
+use crate::world::World;
+use crate::world::coupled_solution::CoupledSolution;
+use crate::world::prefetch::prefetch;
+use dlsys_tree::{ModuleId, SimTime, Visit};
+
+/// A solution without steps begins anew, for all modules, at every event; after this many events steps are made.
+const MAX_CUTS: u32 = 2;
+
+/// A common step of so many components, in units of [`Settings::threads_from`](crate::Settings::threads_from), is shared by threads: they begin anew for
+/// each stage.
+const LARGE: usize = 4;
+
+impl FlowStage<'_, '_> {
+    /// Begins the common trajectory of the coupled modules at an instant.
+    pub fn restart_coupled(&mut self, at: SimTime) -> Result<(), Error> {
+        let members = self.gather_members(at);
+        self.schedule.cancel(Owner::Coupled);
+        self.flows.coupled.pulsing.clear();
+        if self.setup.has_pulses && !self.setup.settings.method.is_fixed_step() {
+            let pulsing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_pulse(*id)).collect();
+            self.flows.coupled.pulsing = pulsing;
+        }
+        self.flows.coupled.members = members;
+        (self.flows.coupled.reintegrated, self.flows.coupled.pending) = (false, false);
+        self.choose_method(at);
+        if self.flows.coupled.members.is_empty() {
+            return Ok(());
+        }
+        if self.flows.coupled.linear.is_some() {
+            self.show_coupled(at);
+            return Ok(());
+        }
+        self.step_coupled(at)
+    }
+
+    /// The coupled modules in string order. Their present values become those of the tree and of the state vector.
+    fn gather_members(&mut self, at: SimTime) -> Vec<ModuleId> {
+        let mut members = std::mem::take(&mut self.flows.coupled.members);
+        members.clear();
+        members.extend(self.world.tree.walk().filter_map(|visit| match visit {
+            Visit::Module(id) if matches!(self.world.states.get(id.slot()), Some(Some(_))) => Some(id),
+            _ => None,
+        }));
+        let solution = self.world.coupled.take();
+        self.flows.coupled.y.clear();
+        self.flows.coupled.system.clear(at);
+        let mut count = 0;
+        for n in 0..members.len() {
+            prefetch(self.world, &members, n);
+            let id = members[n];
+            if self.world.state(id).is_none_or(|s| !s.coupled) {
+                continue;
+            }
+            members[count] = id;
+            count += 1;
+            self.gather_member(id, solution.as_ref(), at);
+        }
+        members.truncate(count);
+        members
+    }
+
+    /// Makes the present values of a module's components those of the tree, and appends them to the state vector.
+    #[inline]
+    fn gather_member(&mut self, id: ModuleId, solution: Option<&CoupledSolution>, at: SimTime) {
+        let World { tree, states, .. } = &mut *self.world;
+        let state = states[id.slot()].as_mut().expect("a member");
+        let first = tree.places(id).start;
+        for &parameter in integrated(self.setup.model, state) {
+            let trajectory = &mut state.trajectories[parameter];
+            let value = match *trajectory {
+                Trajectory::Coupled(component) => solution.and_then(|c| c.value(component as usize, at)),
+                Trajectory::Step(component) => state
+                    .step
+                    .as_ref()
+                    .filter(|step| step.live)
+                    .map(|step| step.dense.value(component as usize, step.dense.position(at))),
+                _ => None,
+            };
+            let place = first + parameter;
+            let value = value.unwrap_or(tree.values()[place]);
+            tree.set_value(place, value);
+            *trajectory = Trajectory::Coupled(self.flows.coupled.y.len() as u32);
+            self.flows.coupled.y.push(value);
+            self.flows.coupled.system.table.places.push((place, id, parameter));
+        }
+        state.pass_changes(at);
+        if !state.next.lasting {
+            state.next = state.next.again();
+            self.schedule.cancel(Owner::Module(id.slot() as u32));
+        }
+    }
+
+    /// Writes the equations of the members, and solves them without steps if they are linear and no event can cut their
+    /// trajectory; else prepares the integrator.
+    fn choose_method(&mut self, at: SimTime) {
+        let without_steps = self.setup.settings.method == Method::Auto
+            && (self.flows.coupled.control.stiff || self.flows.coupled.cuts < MAX_CUTS)
+            && !self.setup.settings.is_sliced()
+            && !self.searches_coupled();
+        let is_explicit = !self.setup.settings.method.is_implicit() && !self.flows.coupled.control.stiff;
+        self.write_equations(at, without_steps || !is_explicit);
+        let Coupled { system, y, integrator, linear, tried, pulsing, .. } = &mut self.flows.coupled;
+        let rules = &self.setup.model.rules;
+        *tried = without_steps;
+        *linear = (without_steps)
+            .then(|| Linear::new(system, rules, y, self.setup.coupled_settings.tolerance))
+            .flatten();
+        // After each step all members are searched.
+        integrator.expect_high_overhead();
+        let is_unwatched =
+            rules.iter().all(|rule| rule.atoms.is_empty()) && pulsing.is_empty() && system.algebra.is_empty();
+        integrator.set_unwatched(is_unwatched);
+        if linear.is_none() {
+            if !system.is_bare {
+                system.prepare_rates(rules);
+            }
+            let settings = &self.setup.settings;
+            let threads = if y.len() < LARGE * settings.threads_from { 1 } else { settings.threads };
+            system.lanes.share(threads);
+            integrator.set_threads(threads);
+            integrator.restart(settings.method, y.len());
+        }
+    }
+
+    /// Writes the equations of the members from an instant on: as columns only, where that is enough.
+    pub(super) fn write_equations(&mut self, at: SimTime, with_table: bool) {
+        let (rules, frozen) = (&self.setup.model.rules, self.setup.settings.is_sliced());
+        let Coupled { system, members, y, .. } = &mut self.flows.coupled;
+        let modules = Membership { world: self.world, members, start: at, frozen };
+        if with_table || frozen || !system.gather(rules, &modules, y.len(), Some) {
+            system.rebuild(rules, &modules, Some);
+        }
+    }
+
+    /// True if some condition of the coupled modules can only be found by searching their common trajectory.
+    pub(super) fn searches_coupled(&self) -> bool {
+        self.flows.coupled.members.iter().any(|id| self.has_conditions(*id))
+    }
+
+    fn has_conditions(&self, id: ModuleId) -> bool {
+        let rule = self.world.state(id).and_then(|s| s.rule);
+        rule.is_some_and(|r| !self.setup.model.rules[r].atoms.is_empty())
+    }
+}

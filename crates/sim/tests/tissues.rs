@@ -1,0 +1,58 @@
+//! Coupled modules whose equations are in columns, and structures so large that memory is fetched ahead.
+
+use dlsys_session::Session;
+use dlsys_sim::{Method, Scheduler, Settings};
+use dlsys_tree::ModuleString;
+
+/// The parameters of all modules at a time, the number of productions up to then, and whether equations have been stiff.
+fn state(text: &str, settings: Settings, t: f64) -> (Vec<f64>, u64, bool) {
+    let session = Session::from_text("tissue.dls", text, &[]).expect("a model");
+    let mut simulation = session.simulate(settings).expect("it starts");
+    let mut string = ModuleString::default();
+    simulation.at(t, &mut string).expect("it runs");
+    let values = string.iter().flat_map(|module| module.parameters.to_vec()).collect();
+    (values, simulation.stats().events, simulation.has_been_stiff())
+}
+
+/// The largest difference of two states, relative to max(1, |value|).
+fn difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| (a - b).abs() / b.abs().max(1.0)).fold(0.0, f64::max)
+}
+
+/// Steps begin as explicit ones, on columns alone; when diffusion has become fast they are implicit, and need a table.
+#[test]
+fn explicit_steps_on_columns_give_way_to_implicit_ones() {
+    let text = "initial string: F_w(3, 1) G(0, 40) F_w(1, 1)\n\
+        G(i, n):\n  if n > 1 produce G(i, floor(n/2)) G(i + floor(n/2), n - floor(n/2))\n  \
+        if n = 1 produce F_c(1 + i*0.618 - floor(i*0.618), 0)\n\
+        F(l, u) < F_c(c, s) > F(r, v): solve dc/dt = 10^(5*s)*(l^2 + r^2 - 2*c^2) - 0.1*c^3, ds/dt = 1 - s^3\n";
+    let auto = state(text, Settings { tolerance: 1e-6, ..Settings::default() }, 2.0);
+    let reference = Settings { tolerance: 1e-9, method: Method::Radau, ..Settings::default() };
+    let exact = state(text, reference, 2.0);
+    assert!(auto.2, "the equations become stiff");
+    let error = difference(&auto.0, &exact.0);
+    assert!(error <= 1e-5, "{error:e}");
+}
+
+/// 2,500 cells whose lives are formulas and whose contents diffuse, some of which turn into others where they are poor: what is
+/// fetched ahead, and what is known about formulas, changes neither the events nor the values.
+#[test]
+fn large_tissues_have_the_events_that_global_steps_find() {
+    let text = "initial string: F_h(1, 255) G(0, 2500) F_h(1, 255)\n\
+        G(i, n):\n  if n > 1 produce G(i, floor(n/2)) G(i + floor(n/2), n - floor(n/2))\n  \
+        if n = 1 produce F_v(0.4 + 0.59*(i*0.618 - floor(i*0.618)), 5 + 20*(i*0.7 - floor(i*0.7)))\n\
+        F(y, l) < F_v(x, c) > F(z, r):\n  \
+        if x < 1 & c > 5 solve dx/dt = 0.05*x, dc/dt = 0.2*(l + r - 2c) - 0.3*c\n  \
+        if x = 1 & c > 5 produce F_v(0.37*x, c) F_v(0.63*x, c)\n  \
+        if c = 5 produce F_h(x, c)\n\
+        F_h(x, c): solve dx/dt = 0.1*(1 - x), dc/dt = 0.15*(255 - c)\n";
+    let settings = Settings { tolerance: 1e-5, ..Settings::default() };
+    let auto = state(text, settings, 1.5);
+    let global = state(text, Settings { scheduler: Scheduler::Global, ..settings }, 1.5);
+    // 5,215 of them are at t = 0, where the cells are made.
+    assert!(auto.1 > 5400, "{} events", auto.1);
+    assert_eq!(auto.1, global.1);
+    let error = difference(&auto.0, &global.0);
+    assert!(error <= 1e-3, "{error:e}");
+}
