@@ -24,7 +24,8 @@ pub struct Outline {
 impl Outline {
     /// Its corners; none if it is too small to be seen.
     pub fn simplified(&self) -> Option<Vec<Corner>> {
-        Some(simplified(&self.places)).filter(|corners| corners.len() >= 3)
+        Some(simplified(&self.places))
+            .filter(|corners| corners.len() >= 3 && area(corners).abs() >= LEAST_AREA)
     }
 }
 
@@ -71,6 +72,9 @@ const STRIP: f64 = 0.4;
 const LEAST_TOLERANCE: f64 = 0.02;
 const TOLERANCE_HIDDEN: f64 = 1.5;
 const TOLERANCE_NEAR_EDGE: f64 = 0.8;
+
+/// The least area that an outline surrounds, in cells: less covers no more than a fiftieth of a pixel.
+const LEAST_AREA: f64 = 0.1;
 
 /// A corner of an outline, in cells from the upper left corner of the mask.
 pub type Corner = [f64; 2];
@@ -171,6 +175,12 @@ where
     }
 }
 
+/// What an outline surrounds, in cells, negative if it goes around it the other way.
+fn area(outline: &[Corner]) -> f64 {
+    let next = outline.iter().cycle().skip(1);
+    outline.iter().zip(next).map(|(p, q)| p[0] * q[1] - q[0] * p[1]).sum::<f64>() / 2.0
+}
+
 /// A closed line with fewer corners, none of the given ones further from it than its tolerance (Ramer, Douglas and Peucker).
 fn simplified(points: &[Place]) -> Vec<Corner> {
     let n = points.len();
@@ -239,11 +249,6 @@ mod tests {
             hidden: |_| None,
         };
         outlines(&mask, inside.len())
-    }
-
-    fn area(outline: &[Corner]) -> f64 {
-        let next = outline.iter().cycle().skip(1);
-        outline.iter().zip(next).map(|(p, q)| p[0] * q[1] - q[0] * p[1]).sum::<f64>() / 2.0
     }
 
     #[test]
