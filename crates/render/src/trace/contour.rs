@@ -65,14 +65,17 @@ struct Place {
 
 /// The greatest distance of outlines, in cells, from the edges of items, from those between two shades of one item, and from where
 /// they should run under what is painted later.
-const TOLERANCE: f64 = 0.25;
-const TOLERANCE_INSIDE: f64 = 0.9;
+const TOLERANCE: f64 = 0.35;
+const TOLERANCE_INSIDE: f64 = 1.1;
 /// That at the edges of a strip, in parts of half its width; and the least one.
 const STRIP: f64 = 0.4;
 const LEAST_TOLERANCE: f64 = 0.02;
 const TOLERANCE_HIDDEN: f64 = 1.5;
 const TOLERANCE_NEAR_EDGE: f64 = 0.8;
 
+/// Cosine of the turn at a corner that is sharp, and sine of that at one which is not.
+const SHARP: f64 = -0.3;
+const STRAIGHT: f64 = 0.4;
 /// The least area that an outline surrounds, in cells: less covers no more than a fiftieth of a pixel.
 const LEAST_AREA: f64 = 0.1;
 
@@ -213,7 +216,47 @@ fn simplified(points: &[Place]) -> Vec<Corner> {
             stretches.extend([(from, worst), (worst, to)]);
         }
     }
-    points.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(place, _)| place.at).collect()
+    let corners: Vec<usize> = (0..n).filter(|i| kept[*i]).collect();
+    balanced(points, &corners)
+}
+
+/// The corners that are kept, moved so that as much lies on one side of the lines between them as on the other. Corners on a curve alone would
+/// make all that is convex smaller.
+fn balanced(points: &[Place], corners: &[usize]) -> Vec<Corner> {
+    let (n, count) = (points.len(), corners.len());
+    // Of the line that begins at each corner: its normal, and how far places are on that side in the mean.
+    let lines: Vec<(Corner, f64)> = (0..count)
+        .map(|k| {
+            let (from, to) = (corners[k], corners[(k + 1) % count]);
+            let to = if to > from { to } else { to + n };
+            let (p, q) = (points[from].at, points[to % n].at);
+            let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
+            let length = dx.hypot(dy);
+            if length == 0.0 {
+                return ([0.0; 2], 0.0);
+            }
+            let normal = [dy / length, -dx / length];
+            let seen =
+                (from + 1..to).map(|i| points[i % n]).filter(|place| place.tolerance <= TOLERANCE_INSIDE);
+            let offset = |place: Place| (0..2).map(|k| (place.at[k] - p[k]) * normal[k]).sum::<f64>();
+            (normal, seen.map(offset).sum::<f64>() / (to - from) as f64)
+        })
+        .collect();
+    let moved = |k: usize| {
+        let by = shift(lines[(k + count - 1) % count], lines[k]);
+        [0, 1].map(|axis| points[corners[k]].at[axis] + by[axis])
+    };
+    (0..count).map(moved).collect()
+}
+
+/// How a corner moves if the two lines that meet there move along their normals by so much. One at the tip of something sharp stays.
+fn shift((p, a): (Corner, f64), (q, b): (Corner, f64)) -> [f64; 2] {
+    let (sin, cos) = (p[0] * q[1] - p[1] * q[0], p[0] * q[0] + p[1] * q[1]);
+    match () {
+        () if cos < SHARP => [0.0; 2],
+        () if sin.abs() > STRAIGHT => [(a * q[1] - b * p[1]) / sin, (b * p[0] - a * q[0]) / sin],
+        () => [0, 1].map(|k| (p[k] + q[k]) / (1.0 + cos) * (a + b) / 2.0),
+    }
 }
 
 #[cfg(test)]
