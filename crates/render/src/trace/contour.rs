@@ -330,9 +330,9 @@ mod tests {
     #[test]
     fn an_edge_is_where_the_covered_parts_say() {
         let parts = [0.0, 1.0, 0.75, 0.0, 0.0];
-        let inside = |i: usize| (1..3).contains(&(i / 5)) && parts[i % 5] > 0.5;
+        let inside = |i: usize| (1..9).contains(&(i / 5)) && parts[i % 5] > 0.5;
         let covered = |i: usize, _| if inside(i) { parts[i % 5] } else { 0.0 };
-        let outlines = outlines(&Mask { width: 5, inside, covered, shade: |_| None, hidden: |_| None }, 20);
+        let outlines = outlines(&Mask { width: 5, inside, covered, shade: |_| None, hidden: |_| None }, 50);
         let right = outlines[0].iter().fold(0.0_f64, |right, p| right.max(p[0]));
         assert!((right - 2.75).abs() < 0.1, "{outlines:?}");
     }
@@ -356,6 +356,22 @@ mod tests {
         let low = found[0].iter().fold(0.0_f64, |low, p| low.max(p[1]));
         let high = found[1].iter().fold(9.0_f64, |high, p| high.min(p[1]));
         assert!((high - low - 0.3).abs() < 1e-9, "{found:?}");
+    }
+
+    #[test]
+    fn what_is_round_keeps_its_area() {
+        for radius in [4.0, 12.3, 18.0] {
+            let covered = |i: usize, _| {
+                let [x, y] = [i % 40, i / 40].map(|x| x as f64 + 0.5 - 20.0);
+                (radius - x.hypot(y) + 0.5).clamp(0.0, 1.0)
+            };
+            let inside = |i: usize| covered(i, Part::Item) >= 0.5;
+            let found =
+                outlines(&Mask { width: 40, inside, covered, shade: |_| None, hidden: |_| None }, 1600);
+            let part = area(&found[0]) / (std::f64::consts::PI * radius * radius);
+            // Eight corners on a circle have nine tenths of its area.
+            assert!(found.len() == 1 && (part - 1.0).abs() < 0.02, "{radius}: {part}, {}", found[0].len());
+        }
     }
 
     #[test]

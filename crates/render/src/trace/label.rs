@@ -2,7 +2,6 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::CELLS_PER_PIXEL;
 use super::memory::{Rasters, filled};
 use super::regions::{COVERED, NOTHING, Regions, Sample};
 use super::scarce;
@@ -17,7 +16,7 @@ use dlsys_geometry::scene::{MaterialId, OwnerId};
 const SHADES: u8 = 20;
 const FINE_SHADES: u8 = 60;
 /// What covers so many pixels is large.
-const LARGE: usize = 10_000;
+const LARGE: f64 = 10_000.0;
 /// Of so many rows and columns one each is looked at to tell what is large, and what is less wide than so many of those is not: in gaps between
 /// other things no steps show.
 const APART: usize = 4;
@@ -131,8 +130,7 @@ pub fn label(
     let mut last = None;
     let mut labels = filled(&mut rasters.labels, numbers.len(), NOTHING);
     let mut item_of: Vec<Option<Item>> = (0..mesh.faces.len()).map(|n| stems.item(mesh, n)).collect();
-    let large = if is_fine { (CELLS_PER_PIXEL * CELLS_PER_PIXEL) as usize * LARGE } else { LARGE };
-    shade_finely(mesh, &mut item_of, numbers, width, large);
+    shade_finely(mesh, &mut item_of, numbers, width, (per_pixel * LARGE) as usize);
     let has_shades = |n: usize| item_of[n].is_some_and(|item| item.stem.is_none());
     let strengths = filled(&mut rasters.strengths, numbers.len(), 0.0);
     let strengths = lit_cells(lit, numbers, width, has_shades, strengths);

@@ -20,6 +20,7 @@ mod memory;
 mod path;
 mod regions;
 mod scarce;
+mod specks;
 mod tones;
 
 use std::borrow::Cow;
@@ -98,7 +99,7 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         &mut rasters,
     );
     regions.with_narrow_parts();
-    regions.without_specks(per_pixel);
+    regions.without_specks(per_pixel, &mut rasters);
     let outlines = regions.outlines(shades.len(), &mut rasters);
     visible.labels = &regions.labels;
 

@@ -81,7 +81,7 @@ mod tests {
         assert_eq!(merged_to(&[9, 9, 9]), (vec![[0, 0], [1, 1], [2, 2]], vec![0, 1, 2]));
         // Two of them are enough for a path.
         assert_eq!(merged_to(&[2, 2, 9]), (vec![[0, 1], [2, 2]], vec![0, 0, 1]));
-        assert_eq!(merged_to(&[1, 1, 1, 1, 1]), (vec![[0, 2], [3, 4]], vec![0, 0, 0, 1, 1]));
+        assert_eq!(merged_to(&[1, 1, 1, 1, 1]), (vec![[0, 1], [2, 4]], vec![0, 0, 1, 1, 1]));
     }
 
     #[test]
@@ -93,7 +93,8 @@ mod tests {
 
     #[test]
     fn shades_of_different_items_stay_apart() {
-        let other = Item { tone: 1, ..item() };
+        let mut other = item();
+        other.tone = 1;
         let both = vec![Shade::new(item(), 0, 0.0, 1), Shade::new(other, 1, 0.05, 1)];
         assert_eq!(merged(both, 1.0).1, [0, 1]);
     }
