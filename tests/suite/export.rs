@@ -49,7 +49,7 @@ fn golden_files() {
 }
 
 /// All elements of an SVG that are drawn.
-fn nodes(group: &usvg::Group) -> Vec<&usvg::Path> {
+pub fn nodes(group: &usvg::Group) -> Vec<&usvg::Path> {
     let mut found = Vec::new();
     for node in group.children() {
         match node {

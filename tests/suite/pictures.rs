@@ -142,6 +142,26 @@ fn stems_are_lit_like_cylinders() {
 }
 
 #[test]
+fn stems_that_stand_on_the_ground_are_cut_there_in_svg_as_in_png() {
+    for text in ["!(0.4)F(4)[&(60)F(2)]", "@W(0.4)F(3)@W(0.3)F(1)[&(60)F(2)]"] {
+        let scene = scene(text);
+        let mut survey = Survey::new(View::FRONT);
+        survey.add(&scene);
+        let writer = FrameWriter::new(Format::SVG, survey.fit());
+        let [_, bottom, _, height] = writer.page.picture.area;
+        let ground =
+            f64::from(writer.page.pixels[1]) / 2.0 + writer.page.pixels_per_unit() * (bottom + height / 2.0);
+        let svg = String::from_utf8(writer.write(&scene, "")).expect("UTF-8");
+        let tree = usvg::Tree::from_str(&svg, &usvg::Options::default()).expect("an SVG");
+        let paths = crate::export::nodes(tree.root());
+        // The background reaches to the lower edge.
+        let lowest = paths.iter().map(|path| f64::from(path.abs_stroke_bounding_box().bottom()));
+        let lowest = lowest.filter(|y| *y < f64::from(writer.page.pixels[1]) - 0.5).fold(0.0_f64, f64::max);
+        assert!((lowest - ground).abs() < 0.6, "{text}: {lowest}, the ground is at {ground}");
+    }
+}
+
+#[test]
 fn pages_have_the_size_and_background_that_was_asked_for() {
     let scene = squares(&[(1.0, 0.0, 7.0)]);
     let mut survey = Survey::new(View::FRONT);

@@ -10,7 +10,7 @@ use std::fmt::Write;
 use super::lighting::Lighting;
 use super::number;
 use super::painter::{DECIMALS, SHADES, Style, text};
-use super::tube::can_join;
+use super::tube::{can_join, stands};
 use dlsys_geometry::scene::{Color, Point, Scene, Segment};
 
 /// Stems thinner than this many pixels of the page have one colour.
@@ -105,7 +105,17 @@ impl<'a> Strokes<'a> {
     ) -> Strokes<'a> {
         let mut ends = vec![[End::Round; 2]; scene.segments.len()];
         for (i, segment) in scene.segments.iter().enumerate() {
-            let Some(before) = segment.follows else { continue };
+            let Some(before) = segment.follows else {
+                let radius = segment.widths[0].resolve(style.fit.default_width) / 2.0;
+                let is_branch = segment.grows_from.is_some();
+                if !style.fit.light.is_flat()
+                    && !is_branch
+                    && stands(segment, radius, scene.surroundings.floor)
+                {
+                    ends[i][0] = End::Straight;
+                }
+                continue;
+            };
             let previous = &scene.segments[before];
             let is_smooth = is_smooth(previous, segment);
             let bends = !is_smooth && style.fit.light.is_flat();
@@ -168,18 +178,20 @@ impl<'a> Strokes<'a> {
         }
         let paint = self.paint(segment, [a, b], (wa + wb) / 2.0);
         let outline = |data: String| Some(Stroke::Path { attributes: format!(" fill=\"{paint}\""), data });
+        let overlap = |from: Point, to: Point| {
+            let along = (to - from).xy().normalize() * (OVERLAP * scale / pixels);
+            Point::new(to.x + along.x, to.y + along.y, to.z)
+        };
+        let is_straight = ends.map(|end| end == End::Straight);
         if from != to {
-            return outline(tapered(a, b, wa / 2.0, wb / 2.0));
+            let end = if is_straight[1] { overlap(a, b) } else { b };
+            return outline(tapered([a, end], [wa / 2.0, wb / 2.0], is_straight));
         }
         // Not every renderer draws the ends of a stroke without length.
         if x1 == x2 && y1 == y2 {
             let attributes = format!(" fill=\"{paint}\" cx=\"{x1}\" cy=\"{y1}\" r=\"{}\"", text(wa / 2.0));
             return Some(Stroke::Element { name: "circle", attributes });
         }
-        let overlap = |from: Point, to: Point| {
-            let along = (to - from).xy().normalize() * (OVERLAP * scale / pixels);
-            Point::new(to.x + along.x, to.y + along.y, to.z)
-        };
         let mut look = String::with_capacity(ROOM);
         look.extend([" stroke=\"", &paint, "\" stroke-width=\"", from, "\""]);
         if ends.iter().any(|end| matches!(end, End::Mitre(_))) {
@@ -192,7 +204,7 @@ impl<'a> Strokes<'a> {
         }
         let longer;
         let mut end = [x2, y2];
-        match ends.map(|end| end == End::Straight) {
+        match is_straight {
             [false, false] => {}
             [true, false] => return outline(half_round(a, b, wa / 2.0)),
             [false, true] => return outline(half_round(overlap(a, b), a, wa / 2.0)),
@@ -373,32 +385,36 @@ fn half_round(a: Point, b: Point, r: f64) -> String {
     data
 }
 
-/// The outline around two circles and what lies between them. It turns as all outlines do (clockwise to the eye), so that
-/// several that overlap can be one path.
-fn tapered(a: Point, b: Point, ra: f64, rb: f64) -> String {
+/// The outline around two circles and what lies between them, cut at those of its ends that are straight. It turns as all outlines do (clockwise to
+/// the eye), so that several that overlap can be one path.
+fn tapered([a, b]: [Point; 2], [ra, rb]: [f64; 2], is_straight: [bool; 2]) -> String {
     let (dx, dy) = (b.x - a.x, b.y - a.y);
     let distance = dx.hypot(dy);
     let mut data = String::new();
-    if distance <= (ra - rb).abs() {
+    if distance <= (ra - rb).abs() && is_straight != [true, true] || distance == 0.0 {
         // One circle holds the other.
         let (c, r) = if ra > rb { (a, ra) } else { (b, rb) };
         push(&mut data, "M", &[c.x - r, c.y]);
         push(&mut data, "A", &[r, r, 0.0, 0.0, 1.0, c.x + r, c.y]);
         push(&mut data, "A", &[r, r, 0.0, 0.0, 1.0, c.x - r, c.y]);
     } else {
-        // The common tangents touch at this sine from the axis.
-        let sin = (ra - rb) / distance;
-        let cos = (1.0 - sin * sin).sqrt();
         let (ex, ey) = (dx / distance, dy / distance);
-        let touch = |c: Point, r: f64, side: f64| {
+        // The common tangents touch at this sine from the axis; at a straight end the outline is where the radius ends.
+        let touch = |k: usize, side: f64| {
+            let sin = if is_straight[k] { 0.0 } else { (ra - rb) / distance };
+            let cos = (1.0 - sin * sin).sqrt();
+            let (c, r) = [(a, ra), (b, rb)][k];
             [c.x + r * (sin * ex - side * cos * ey), c.y + r * (sin * ey + side * cos * ex)]
         };
         let large = |this: f64, other: f64| if this > other { 1.0 } else { 0.0 };
-        let [p, q, s, t] = [touch(a, ra, 1.0), touch(b, rb, 1.0), touch(b, rb, -1.0), touch(a, ra, -1.0)];
-        push(&mut data, "M", &p);
-        push(&mut data, "A", &[ra, ra, 0.0, large(ra, rb), 1.0, t[0], t[1]]);
-        push(&mut data, "L", &s);
-        push(&mut data, "A", &[rb, rb, 0.0, large(rb, ra), 1.0, q[0], q[1]]);
+        let end = |data: &mut String, k: usize, [r, other]: [f64; 2], [x, y]: [f64; 2]| match is_straight[k] {
+            true => push(data, "L", &[x, y]),
+            false => push(data, "A", &[r, r, 0.0, large(r, other), 1.0, x, y]),
+        };
+        push(&mut data, "M", &touch(0, 1.0));
+        end(&mut data, 0, [ra, rb], touch(0, -1.0));
+        push(&mut data, "L", &touch(1, -1.0));
+        end(&mut data, 1, [rb, ra], touch(1, 1.0));
     }
     data.push('Z');
     data

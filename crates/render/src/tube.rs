@@ -30,6 +30,7 @@ use section::Profile;
 pub use section::Spoke;
 pub(super) use section::{Section, circle, curve, sides_for};
 use structure::Structure;
+pub(super) use structure::stands;
 
 /// Least cosine of a bend within a tube (100 degrees).
 const SHARPEST: f64 = -0.173_648_177_666_930_3;

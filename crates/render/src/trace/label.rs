@@ -2,9 +2,9 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::CELLS_PER_PIXEL;
 use super::memory::{Rasters, filled};
 use super::regions::{COVERED, NOTHING, Regions, Sample};
+use super::scarce;
 use super::tones::{MOST, Tones};
 use crate::formats::png::Lit;
 use crate::raster::cells::{self, Given, Nearest};
@@ -16,23 +16,38 @@ use dlsys_geometry::scene::{MaterialId, OwnerId};
 const SHADES: u8 = 20;
 const FINE_SHADES: u8 = 60;
 /// What covers so many pixels is large.
-const LARGE: usize = 10_000;
-/// Of so many rows and columns one each is looked at to tell what is large.
+const LARGE: f64 = 10_000.0;
+/// Of so many rows and columns one each is looked at to tell what is large, and what is less wide than so many of those is not: in gaps between
+/// other things no steps show.
 const APART: usize = 4;
+const WIDE: usize = 8;
 
-/// A region: cells of one item and one shade.
+/// A region: cells of one item and one shade, or a few shades next to one another.
+#[derive(Clone)]
 pub struct Shade {
     pub item: Item,
-    /// The shade, in steps of one over the item's shades; 0 for all of a stem that is painted with a gradient.
-    step: i32,
+    /// The shades, in steps of one over the item's shades: the darkest and the lightest; 0 for all of a stem that is painted with a gradient.
+    pub step: i32,
+    pub last: i32,
     /// The sum of the strengths of light in its cells, and their number.
     sum: f64,
-    count: usize,
+    pub count: usize,
 }
 
 impl Shade {
+    /// So many cells of a strength of light, of one step.
+    pub fn new(item: Item, step: i32, strength: f64, count: usize) -> Shade {
+        Shade { item, step, last: step, sum: strength * count as f64, count }
+    }
+
     fn key(&self) -> (Item, i32) {
         (self.item, self.step)
+    }
+
+    /// Takes in lighter shades of its item.
+    pub fn add(&mut self, lighter: &Shade) {
+        self.last = lighter.last;
+        (self.sum, self.count) = (self.sum + lighter.sum, self.count + lighter.count);
     }
 
     /// The mean strength of light in its cells.
@@ -55,6 +70,11 @@ pub struct Item {
 }
 
 impl Item {
+    /// All of a look.
+    pub fn of(look: Look) -> Item {
+        Item { look, stem: None, tone: 0, shades: SHADES }
+    }
+
     /// The shade of a strength of light.
     fn step(&self, strength: f64) -> i32 {
         (strength * f64::from(self.shades)).round() as i32
@@ -76,12 +96,8 @@ impl Stems {
         let look = (face.owner, face.material);
         let segment = mesh.segments.get(face.surface as usize).copied().flatten();
         let stem = segment.filter(|segment| self.gradients.contains(segment));
-        (segment.is_none() || !self.strokes.contains(&look)).then_some(Item {
-            look,
-            stem,
-            tone: 0,
-            shades: SHADES,
-        })
+        let is_shown = segment.is_none() || !self.strokes.contains(&look);
+        is_shown.then_some(Item { stem, ..Item::of(look) })
     }
 }
 
@@ -98,14 +114,14 @@ pub fn nearest(mesh: &Triangles, lit: &Lit, size: [usize; 2], rasters: &mut Rast
 }
 
 /// The raster of regions, and their shades by number. Regions are painted in the order of modules, materials and shades.
-/// Of cells finer than pixels edges have fewer samples.
+/// A pixel of the page is so many cells; of cells finer than pixels edges have fewer samples.
 pub fn label(
     mesh: &Triangles,
     lit: &Lit,
     numbers: &[[u32; 1]],
     [width, height]: [usize; 2],
     (stems, tones): (&Stems, &Tones),
-    is_fine: bool,
+    (is_fine, per_pixel): (bool, f64),
     rasters: &mut Rasters,
 ) -> (Regions, Vec<Shade>) {
     // Regions are numbered as they are found, then in the order of painting.
@@ -114,8 +130,7 @@ pub fn label(
     let mut last = None;
     let mut labels = filled(&mut rasters.labels, numbers.len(), NOTHING);
     let mut item_of: Vec<Option<Item>> = (0..mesh.faces.len()).map(|n| stems.item(mesh, n)).collect();
-    let large = if is_fine { (CELLS_PER_PIXEL * CELLS_PER_PIXEL) as usize * LARGE } else { LARGE };
-    shade_finely(mesh, &mut item_of, numbers, width, large);
+    shade_finely(mesh, &mut item_of, numbers, width, (per_pixel * LARGE) as usize);
     let has_shades = |n: usize| item_of[n].is_some_and(|item| item.stem.is_none());
     let strengths = filled(&mut rasters.strengths, numbers.len(), 0.0);
     let strengths = lit_cells(lit, numbers, width, has_shades, strengths);
@@ -135,7 +150,7 @@ pub fn label(
         let number = match last {
             Some((same, number)) if same == key => number,
             _ => *known.entry(key).or_insert_with(|| {
-                shades.push(Shade { item, step, sum: 0.0, count: 0 });
+                shades.push(Shade::new(item, step, 0.0, 0));
                 shades.len() as u32 - 1
             }),
         };
@@ -147,10 +162,11 @@ pub fn label(
     clear_rim(&mut labels, width);
     let mut order: Vec<u32> = (0..shades.len() as u32).collect();
     order.sort_by_key(|number| shades[*number as usize].key());
-    let mut ranks = vec![0; order.len()];
-    order.iter().zip(0..).for_each(|(number, rank)| ranks[*number as usize] = rank);
-    labels.iter_mut().filter(|label| **label < COVERED).for_each(|label| *label = ranks[*label as usize]);
     shades.sort_by_key(Shade::key);
+    let (shades, of_shade) = scarce::merged(shades, per_pixel);
+    let mut ranks = vec![0; order.len()];
+    order.iter().zip(of_shade).for_each(|(number, rank)| ranks[*number as usize] = rank);
+    labels.iter_mut().filter(|label| **label < COVERED).for_each(|label| *label = ranks[*label as usize]);
 
     let (items, of_item) = items(&shades);
     let empty = filled(&mut rasters.places, labels.len(), 0);
@@ -180,7 +196,8 @@ pub fn label(
     let least =
         shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / f64::from(shade.item.shades)).collect();
     let steps = shades.iter().map(|shade| shade.step).collect();
-    (Regions { width, labels, places, samples, per_cell, items, steps, strengths, least }, shades)
+    let means = shades.iter().map(Shade::strength).collect();
+    (Regions { width, labels, places, samples, per_cell, items, steps, strengths, least, means }, shades)
 }
 
 /// Gives more shades to the looks of surfaces that cover more than so many cells each. Triangles of one look follow one another, and so do
@@ -193,8 +210,14 @@ fn shade_finely(
     large: usize,
 ) {
     let mut covered = vec![0; items.len() + 1];
+    // Nothing is no surface.
+    let surface = |number: u32| Some(mesh.faces[(number as usize).checked_sub(1)?].surface);
+    let mut run: Vec<u32> = Vec::new();
     for row in numbers.chunks(width).step_by(APART) {
-        row.iter().step_by(APART).for_each(|[number]| covered[*number as usize] += APART * APART);
+        run.clear();
+        run.extend(row.iter().step_by(APART).map(|[number]| *number));
+        let wide = run.chunk_by(|a, b| surface(*a) == surface(*b)).filter(|run| run.len() >= WIDE);
+        wide.flatten().for_each(|number| covered[*number as usize] += APART * APART);
     }
     let mut first = 0;
     for run in items.chunk_by_mut(|a, b| a.map(|item| item.look) == b.map(|item| item.look)) {
@@ -352,11 +375,11 @@ fn edges(
     mut places: Vec<u32>,
 ) -> (Vec<u32>, usize) {
     let item = |label: u32| items.get(label as usize).copied();
-    let step = |label: u32| shades.get(label as usize).map_or(0, |shade| shade.step);
     // As far apart as two of the coarse shades.
     let is_crease = |p: u32, q: u32| {
-        let fine = shades.get(p as usize).map_or(1, |shade| u32::from(shade.item.shades / SHADES));
-        step(p).abs_diff(step(q)) > fine
+        let both = [p.min(q), p.max(q)].map(|label| shades.get(label as usize));
+        let [Some(dark), Some(light)] = both else { return false };
+        light.step - dark.last > i32::from(dark.item.shades / SHADES)
     };
     let mut mark = |a: usize, b: usize| {
         // Most neighbours are of one region.

@@ -19,6 +19,8 @@ mod label;
 mod memory;
 mod path;
 mod regions;
+mod scarce;
+mod specks;
 mod tones;
 
 use std::borrow::Cow;
@@ -73,6 +75,8 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let mesh = mesh(scene, style.fit, 1.0 / finest, has_triangles);
     let is_fine = mesh.faces.len() > PLAIN;
     let cell = if is_fine { finest } else { cell_of(1.0) };
+    // Cells in a pixel of the page.
+    let per_pixel = (cell * style.pixels).powi(-2);
     let [a, b, c] = [1.0 / cell, -left / cell, (bottom + height) / cell];
     let mut lit = Lit::new(scene, &mesh, style.fit, [a, b, c], style.floor);
     // Of the raster only the part in which something is drawn.
@@ -85,10 +89,17 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };
     let stems = stems(scene, style, &visible, lit.lighting().is_declared());
     let tones = Tones::of(&scene.palette);
-    let (mut regions, shades) =
-        label::label(&mesh, &lit, &nearest.numbers, size, (&stems, &tones), is_fine, &mut rasters);
+    let (mut regions, shades) = label::label(
+        &mesh,
+        &lit,
+        &nearest.numbers,
+        size,
+        (&stems, &tones),
+        (is_fine, per_pixel),
+        &mut rasters,
+    );
     regions.with_narrow_parts();
-    regions.without_specks();
+    regions.without_specks(per_pixel, &mut rasters);
     let outlines = regions.outlines(shades.len(), &mut rasters);
     visible.labels = &regions.labels;
 

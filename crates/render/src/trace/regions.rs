@@ -44,6 +44,8 @@ pub struct Regions {
     pub strengths: Vec<f32>,
     /// By region: the least strength of light in its cells.
     pub least: Vec<f64>,
+    /// By region: the mean of them.
+    pub means: Vec<f64>,
 }
 
 /// Marks on the cells of a raster, a number for each region piece, so that they need not be taken away.
@@ -58,29 +60,6 @@ struct Marks {
 }
 
 impl Regions {
-    /// Gives cells that stand alone among others of their item to a neighbour, so that noise of shading makes no outlines. A narrow
-    /// strip that runs aslant is no such cell: its cells touch in their corners.
-    pub fn without_specks(&mut self) {
-        let item = |label: u32| self.items.get(label as usize).copied();
-        let is_alone = |cell: &usize| {
-            let label = self.labels[*cell];
-            let differs = |other: usize| self.labels[other] != label;
-            label < COVERED
-                && self.around(*cell).into_iter().all(differs)
-                && self.corners(*cell).into_iter().all(differs)
-        };
-        // All at once, so that one label does not spread from cell to cell.
-        let mut changes = Vec::new();
-        for cell in (0..self.labels.len()).filter(is_alone) {
-            let own = item(self.labels[cell]);
-            let around = self.around(cell).map(|other| self.labels[other]);
-            if let Some(other) = around.into_iter().find(|other| item(*other) == own) {
-                changes.push((cell, other));
-            }
-        }
-        changes.into_iter().for_each(|(cell, label)| self.labels[cell] = label);
-    }
-
     /// Gives cells to the narrow things in them, which the middles of most cells miss: to what has a quarter of a cell's samples, but few
     /// cells around it. So what is narrow hangs together; how wide it is, the samples say. A gap is such a thing, too.
     pub fn with_narrow_parts(&mut self) {
@@ -132,8 +111,9 @@ impl Regions {
         let first = self.items.partition_point(|other| *other < item);
         let end = self.items.partition_point(|other| *other <= item);
         let last = end.checked_sub(1).filter(|last| *last >= first)?;
-        let next = first + self.steps[first..end].partition_point(|other| *other < step);
-        Some(next.min(last) as u32)
+        // Those that have more than one shade are known by the darkest.
+        let next = first + self.steps[first..end].partition_point(|other| *other <= step);
+        Some(next.saturating_sub(1).clamp(first, last) as u32)
     }
 
     /// What is seen at the samples of a cell at an edge.
@@ -298,23 +278,23 @@ impl Regions {
     }
 
     /// The cells beside, above and below one that is not at the rim of the raster.
-    fn around(&self, cell: usize) -> [usize; 4] {
+    pub fn around(&self, cell: usize) -> [usize; 4] {
         [cell - 1, cell + 1, cell - self.width, cell + self.width]
     }
 
     /// The cells that touch such a one in a corner only.
-    fn corners(&self, cell: usize) -> [usize; 4] {
+    pub fn corners(&self, cell: usize) -> [usize; 4] {
         let [up, down] = [cell - self.width, cell + self.width];
         [up - 1, up + 1, down - 1, down + 1]
     }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// Regions by their digits; each is an item of its own, and no cell is at an edge.
-    fn regions(rows: &[&str]) -> Regions {
+    pub fn regions(rows: &[&str]) -> Regions {
         let label = |b: u8| if b == b'.' { NOTHING } else { u32::from(b - b'0') };
         let rim = ".".repeat(rows[0].len() + 2);
         let rows: Vec<String> = rows.iter().map(|row| format!(".{row}.")).collect();
@@ -333,6 +313,7 @@ mod tests {
             items,
             strengths,
             least: vec![0.0; 10],
+            means: vec![0.0; 10],
             steps: vec![0; 10],
         }
     }
@@ -386,15 +367,6 @@ mod tests {
     }
 
     #[test]
-    fn a_narrow_strip_that_runs_aslant_is_one_region() {
-        let of = || regions(&["0111", "2011", "2201", "2220"]);
-        let mut cleaned = of();
-        cleaned.without_specks();
-        assert_eq!(cleaned.labels, of().labels);
-        assert_eq!(of().outlines(3, &mut Rasters::default())[0].len(), 1);
-    }
-
-    #[test]
     fn a_narrow_part_hangs_together_though_most_middles_miss_it() {
         let mut of = regions(&["0000000", "0100010", "0000000"]);
         of.per_cell = 4;
@@ -413,16 +385,5 @@ mod tests {
         wide.samples = [1, 1, 0, 0].map(|item| Sample { item, step: 0 }).to_vec();
         wide.with_narrow_parts();
         assert_eq!(wide.labels[row + 3], 0);
-    }
-
-    #[test]
-    fn a_cell_alone_goes_to_a_neighbour_of_its_item_only() {
-        let mut of = regions(&["000", "010", "000"]);
-        let middle = 2 * of.width + 2;
-        of.without_specks();
-        assert_eq!(of.labels[middle], 1, "another item");
-        of.items = vec![0; 10];
-        of.without_specks();
-        assert_eq!(of.labels[middle], 0);
     }
 }

@@ -19,6 +19,12 @@ fn joins([a, b]: [&Segment; 2], radii: [f64; 2], grown: bool) -> bool {
     can_join(a, b, if blends { [thick; 2] } else { radii })
 }
 
+/// Whether a stem of this radius that begins with a segment stands on a floor, or on the height 0 if there is none: it is cut there.
+pub(crate) fn stands(segment: &Segment, radius: f64, floor: Option<f64>) -> bool {
+    let height = segment.start.y - floor.unwrap_or(0.0);
+    height.abs() <= 1e-6 * radius && segment.direction.y >= 0.5
+}
+
 /// How segments hang together.
 pub(super) struct Structure {
     pub(super) radii: Vec<[f64; 2]>,
@@ -189,10 +195,10 @@ impl Structure {
             let begin = if radius <= 1.001 * thickness { Begin::Flat } else { Begin::Dome };
             return (begin, collar.filter(|_| begin == Begin::Flat));
         }
-        let ground = style.floor.unwrap_or(0.0);
-        if (start.y - ground).abs() > 1e-6 * radius || segment.direction.y < 0.5 {
+        if !stands(segment, radius, style.floor) {
             return (Begin::Dome, None);
         }
+        let ground = style.floor.unwrap_or(0.0);
         let even = self.even_length(&scene.segments, first);
         let floor = style.floor.filter(|_| even > 0.0);
         let foot = floor.map(|_| Collar::of_foot(start, segment.direction, radius, (ground, even)));
