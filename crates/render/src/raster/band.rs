@@ -16,8 +16,6 @@ use dlsys_geometry::scene::Drawn;
 const NOTHING: u32 = u32::MAX;
 /// Several triangles share the pixel.
 const MIXED: u32 = u32::MAX - 1;
-/// A pixel has no fragments.
-const NO_SLOT: u32 = u32::MAX;
 
 /// A pixel as a whole.
 #[derive(Clone, Copy)]
@@ -36,10 +34,8 @@ pub(super) struct Band<const N: usize> {
     places: Places<N>,
     width: usize,
     pixels: Vec<Pixel>,
-    /// Of pixels that several triangles share or did: where in `shared` their fragments are, of which so many are used. Most pixels have none.
-    slots: Vec<u32>,
+    /// Of pixels that several triangles share.
     shared: Vec<Fragments<N>>,
-    used: usize,
     /// Of the triangles that are seen or were, by their places in the list.
     planes: Vec<Plane>,
     /// First column in which something may be drawn, and the one after the last: most of a picture is empty.
@@ -52,9 +48,7 @@ impl<const N: usize> Band<N> {
             places: places(pattern),
             width,
             pixels: vec![EMPTY; width * BAND],
-            slots: vec![NO_SLOT; width * BAND],
-            shared: Vec::new(),
-            used: 0,
+            shared: vec![Fragments::EMPTY; width * BAND],
             planes: Vec::new(),
             touched: [0; 2],
         }
@@ -66,10 +60,6 @@ impl<const N: usize> Band<N> {
         for row in self.pixels.chunks_exact_mut(self.width.max(1)) {
             row[first..end].fill(EMPTY);
         }
-        for row in self.slots.chunks_exact_mut(self.width.max(1)) {
-            row[first..end].fill(NO_SLOT);
-        }
-        self.used = 0;
         self.planes.clear();
         self.planes.resize(numbers.len(), Plane::NONE);
         for place in nearest_first(triangles, numbers) {
@@ -135,15 +125,7 @@ impl<const N: usize> Band<N> {
                 if mask == 0 {
                     continue;
                 }
-                let slot = &mut self.slots[line + column];
-                if *slot == NO_SLOT {
-                    *slot = self.used as u32;
-                    self.used += 1;
-                    if self.used > self.shared.len() {
-                        self.shared.push(Fragments::EMPTY);
-                    }
-                }
-                let shared = &mut self.shared[*slot as usize];
+                let shared = &mut self.shared[line + column];
                 if pixel.seen != MIXED {
                     shared.begin((pixel.seen != NOTHING).then_some((pixel.seen, pixel.far)));
                     pixel.seen = MIXED;
@@ -185,11 +167,7 @@ impl<const N: usize> Band<N> {
                     },
                     MIXED => {
                         let surface = |place: u32| triangles.surface(numbers[place as usize] as usize);
-                        self.shared[self.slots[index] as usize].mean(
-                            surface,
-                            |place| color(place, at),
-                            || triangles.open(at),
-                        )
+                        self.shared[index].mean(surface, |place| color(place, at), || triangles.open(at))
                     }
                     place => color(place, at),
                 };

@@ -109,15 +109,14 @@ pub(crate) fn at_samples<'c, const N: usize>(
 ) -> Nearest<N> {
     let mut nearest = Nearest { numbers: vec![[0; N]; count], depths: vec![[f32::NEG_INFINITY; N]; count] };
     let Given { corners, cut, .. } = triangles;
-    let marked = Marked::of(size, |cell| place(cell) < count);
     for number in (0..triangles.count).filter(|number| seen(*number)) {
-        nearest.add(pattern, &marked, (number, corners(number), || cut(number)), &place, |_, _| true);
+        nearest.add(pattern, size, (number, corners(number), || cut(number)), &place, |_, _| true);
     }
     let farthest = |depths: &[f32; N]| depths.iter().copied().fold(f32::INFINITY, f32::min);
     let far: Vec<f32> = nearest.depths.iter().map(farthest).collect();
     let is_open = |place: usize, depth: f32| far.get(place).is_some_and(|far| depth + EQUAL >= *far);
     for number in (0..triangles.count).filter(|number| !seen(*number)) {
-        nearest.add(pattern, &marked, (number, corners(number), || cut(number)), &place, is_open);
+        nearest.add(pattern, size, (number, corners(number), || cut(number)), &place, is_open);
     }
     nearest
 }
@@ -127,19 +126,18 @@ impl<const N: usize> Nearest<N> {
     fn add<'c>(
         &mut self,
         pattern: &Pattern<N>,
-        marked: &Marked,
+        [width, height]: [usize; 2],
         (number, corners, cut): (usize, [Place; 3], impl FnOnce() -> Option<Cut<'c>>),
         place: impl Fn(usize) -> usize,
         is_open: impl Fn(usize, f32) -> bool,
     ) {
-        let [width, height] = marked.size;
         let front = corners[0].depth.max(corners[1].depth).max(corners[2].depth);
         let count = self.numbers.len();
         let is_drawn = |cell: usize| {
             let at = place(cell);
             at < count && is_open(at, front)
         };
-        if !touches(&corners, marked, is_drawn) {
+        if !touches(&corners, [width, height], is_drawn) {
             return;
         }
         let Some(Ready { columns, rows, sides, plane }) = Ready::new(corners, width, &(0..height)) else {
@@ -195,49 +193,17 @@ impl<const N: usize> Nearest<N> {
     }
 }
 
-/// Whether a triangle may touch a pixel that is to be drawn, which are some of those marked. Most of the small ones do not.
-fn touches(corners: &[Place; 3], marked: &Marked, is_drawn: impl Fn(usize) -> bool) -> bool {
+/// Whether a triangle may touch a pixel that is to be drawn. Most of the small ones do not.
+fn touches(corners: &[Place; 3], [width, height]: [usize; 2], is_drawn: impl Fn(usize) -> bool) -> bool {
     let range = |at: [i32; 3], count: usize| {
         let low = i64::from(at[0].min(at[1]).min(at[2])).div_euclid(STEPS);
         let high = i64::from(at[0].max(at[1]).max(at[2])).div_euclid(STEPS) + 1;
         low.max(0) as usize..high.clamp(0, count as i64) as usize
     };
-    let [width, height] = marked.size;
     let columns = range(corners.each_ref().map(|corner| corner.x), width);
     let mut rows = range(corners.each_ref().map(|corner| corner.y), height);
-    let is_any = |row: usize| columns.clone().any(|column| is_drawn(row * width + column));
-    columns.len() * rows.len() > FEW || rows.any(|row| marked.any(row, &columns) && is_any(row))
-}
-
-/// Some of the pixels of a picture of this size, as bits, so that many are looked at together.
-struct Marked {
-    size: [usize; 2],
-    /// In a row.
-    words: usize,
-    bits: Vec<u64>,
-}
-
-impl Marked {
-    fn of(size: [usize; 2], is_marked: impl Fn(usize) -> bool) -> Marked {
-        let [width, height] = size;
-        let words = width.div_ceil(64);
-        let mut bits = vec![0; words * height];
-        for row in 0..height {
-            for column in (0..width).filter(|column| is_marked(row * width + column)) {
-                bits[row * words + column / 64] |= 1 << (column % 64);
-            }
-        }
-        Marked { size, words, bits }
-    }
-
-    /// Whether any pixel of a row is one, between two columns.
-    fn any(&self, row: usize, columns: &Range<usize>) -> bool {
-        let Range { start, end } = *columns;
-        let from = |word: usize| if word == start / 64 { u64::MAX << (start % 64) } else { u64::MAX };
-        let upto = |word: usize| if word == end / 64 { !(u64::MAX << (end % 64)) } else { u64::MAX };
-        let row = &self.bits[row * self.words..][..self.words];
-        (start / 64..end.div_ceil(64)).any(|word| row[word] & from(word) & upto(word) != 0)
-    }
+    columns.len() * rows.len() > FEW
+        || rows.any(|row| columns.clone().any(|column| is_drawn(row * width + column)))
 }
 
 /// The weights of a triangle's corners in the middle of a pixel, or near it if that is outside.
@@ -249,27 +215,4 @@ pub(crate) fn weights([p, q, r]: [Corner; 3], [column, row]: [usize; 2]) -> [f64
     let inner = raw.map(|w| (w / area).max(0.0));
     let sum: f64 = inner.iter().sum();
     if sum.is_finite() && sum > 0.0 { inner.map(|w| w / sum) } else { [1.0 / 3.0; 3] }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn marked_pixels_are_found_between_any_two_columns() {
-        let size = [200, 3];
-        for at in [0, 1, 63, 64, 65, 127, 128, 199] {
-            let marked = Marked::of(size, |cell| cell == 200 + at);
-            for start in (0..200).step_by(7) {
-                for end in (start..=200).step_by(9) {
-                    assert_eq!(
-                        marked.any(1, &(start..end)),
-                        (start..end).contains(&at),
-                        "{at}: {start}, {end}"
-                    );
-                    assert!(!marked.any(0, &(start..end)) && !marked.any(2, &(start..end)));
-                }
-            }
-        }
-    }
 }

@@ -65,7 +65,7 @@ struct Place {
 
 /// The greatest distance of outlines, in cells, from the edges of items, from those between two shades of one item, and from where
 /// they should run under what is painted later.
-const TOLERANCE: f64 = 0.35;
+const TOLERANCE: f64 = 0.25;
 const TOLERANCE_INSIDE: f64 = 1.1;
 /// That at the edges of a strip, in parts of half its width; and the least one.
 const STRIP: f64 = 0.4;
