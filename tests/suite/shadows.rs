@@ -183,22 +183,6 @@ fn pixels_do_not_depend_on_threads() {
 }
 
 #[test]
-fn a_flat_drawing_stays_as_it_is() {
-    let plain = scene("F(1)[+(30)F(1)]F(1)");
-    let mut lit = plain.clone();
-    lit.surroundings.sun = Some(Vector::new(1.0, 2.0, 3.0));
-    lit.surroundings.floor = Some(0.0);
-    for format in [Format::PNG, Format::SVG] {
-        let drawn = |scene: &Scene| {
-            let mut survey = Survey::new(View::FRONT);
-            survey.add(scene);
-            FrameWriter::new(format, survey.fit()).write(scene, "")
-        };
-        assert!(drawn(&plain) == drawn(&lit), "{format:?}");
-    }
-}
-
-#[test]
 fn a_floor_is_a_group_of_a_mesh_and_regions_of_a_drawing_and_does_not_change_the_frame() {
     let scene = pole();
     let mut bare = scene.clone();
