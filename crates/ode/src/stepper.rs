@@ -96,8 +96,6 @@ pub struct Stepper {
     /// So many components may err by more than is tolerated in a step, if the method tells the errors of single ones: those that
     /// the caller integrates again, [`Stepper::rough`].
     pub spared: usize,
-    /// The components that err by more than is tolerated in the step just made.
-    rough: Vec<u32>,
     /// Start, length and end of the step just made.
     step: (SimTime, f64, SimTime),
     /// Its error, relative.
@@ -314,7 +312,7 @@ impl Stepper {
 
     /// The largest error of a component that is not spared, given the largest of all.
     fn spare(&mut self, scheme: Scheme, error: f64) -> f64 {
-        self.rough.clear();
+        self.work.rough.clear();
         let errors = self.schemes.component_errors(scheme);
         if self.spared == 0 || self.spared >= errors.len() {
             return error;
@@ -323,7 +321,7 @@ impl Stepper {
         let (_, most, _) = sorted.select_nth_unstable_by(self.spared, |a, b| b.total_cmp(a));
         if *most <= 1.0 {
             let rough = errors.iter().enumerate().filter(|(_, error)| **error > 1.0);
-            self.rough.extend(rough.map(|(component, _)| component as u32));
+            self.work.rough.extend(rough.map(|(component, _)| component as u32));
         }
         *most
     }
@@ -331,7 +329,7 @@ impl Stepper {
     /// The components, in ascending order, that err by more than is tolerated in the step just made; no more than
     /// [`Stepper::spared`].
     pub fn rough(&self) -> &[u32] {
-        &self.rough
+        &self.work.rough
     }
 
     /// Judges a step whose estimated error, by truncation or by rounding, is larger than tolerated: it is rejected unless shorter

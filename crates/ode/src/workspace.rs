@@ -41,6 +41,8 @@ pub struct Workspace {
     pub(crate) resolution: f64,
     /// Evaluations of the equations of single modules so far.
     pub(crate) evaluations: u64,
+    /// The components, in ascending order, that err by more than is tolerated in the step just tried, and are to be integrated again.
+    pub(crate) rough: Vec<u32>,
     /// So many threads share the components of sums over stages.
     pub(crate) threads: usize,
 }

@@ -201,6 +201,7 @@ impl OneStep for Radau {
             work.evaluate(system, place * dense.h, 1);
             let rates = slopes.iter().zip(&work.k[1]);
             let mut errors: Vec<f64> = rates.map(|(slope, rate)| dense.h * rate - slope).collect();
+            work.rough.iter().for_each(|component| errors[*component as usize] = 0.0);
             stages.settle(pattern, &mut errors);
             for (component, error) in errors.into_iter().enumerate() {
                 if !error.is_finite() {
