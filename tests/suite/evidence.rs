@@ -490,15 +490,16 @@ fn stiff_values_follow_what_they_are_drawn_to_between_the_stages_of_steps() {
             )
         };
         let event = "  if y > 1.5 produce E\n";
-        let cases: [(String, fn(f64) -> f64); 6] = [
-            (alone(&sine, ""), f64::sin),
-            (alone(&sine, event), f64::sin),
-            (alone(&ramp, ""), |t| (3.0 * (t - 8.0)).tanh()),
-            (alone(&ramp, event), |t| (3.0 * (t - 8.0)).tanh()),
-            (beside(""), f64::sin),
-            (beside(event), f64::sin),
-        ];
-        for (text, target) in cases {
+        let wave: fn(f64) -> f64 = f64::sin;
+        let rise: fn(f64) -> f64 = |t| (3.0 * (t - 8.0)).tanh();
+        for (text, target) in [
+            (alone(&sine, ""), wave),
+            (alone(&sine, event), wave),
+            (alone(&ramp, ""), rise),
+            (alone(&ramp, event), rise),
+            (beside(""), wave),
+            (beside(event), wave),
+        ] {
             let session = session(&text);
             let mut simulation = session.simulate(Settings::default()).expect("it starts");
             let mut string = Default::default();
@@ -574,4 +575,33 @@ fn what_is_left_of_a_large_value_has_its_digits() {
         let found = first_event(&text, Settings::default(), 100.0).expect("it runs");
         assert!(found.is_some_and(|t| (t - exact).abs() < 1e-6), "{found:?}, not {exact}, of\n{text}");
     }
+}
+
+/// A steep formula whose condition changes goes on from what it is, not from a rounding of the instant of the change.
+#[test]
+fn a_steep_formula_leaves_no_residue_behind_a_switch() {
+    for (law, at) in [("6.8e6*exp(-abs((t - 5.565)/1.48e-7))", 20.0), ("1e13*max(0, 5.56 - t)", 6.0)] {
+        let v = last_value(&format!("initial string: A(0)\nA(v): solve v = {law}\n"), at);
+        assert_eq!(v, 0.0, "{law}");
+        let seen = last_value(
+            &format!(
+                "initial string: A(0) B(0)\nA(v): solve v = {law}\nA(v) < B(y): solve dy/dt = 1 + v - v\n"
+            ),
+            at,
+        );
+        assert!((seen - at).abs() < 1e-4, "{seen} for {at}: {law}");
+    }
+}
+
+/// After a pole, at which its sides are as large as numbers can be, a condition changes where its sides meet, however soon that is.
+#[test]
+fn conditions_that_come_back_after_a_pole_are_seen() {
+    let after = |condition: &str, at| {
+        last_value(&format!("initial string: A(0)\nA(y): solve dy/dt = if {condition} then 1 else 0\n"), at)
+    };
+    // False from the pole at 2 to 2.2.
+    assert!((after("1/(2 - t) > -5", 6.0) - 5.8).abs() < 1e-5);
+    // False from the pole at π/2 to atan(-2) + π.
+    let exact = 3.0 - (std::f64::consts::FRAC_PI_2 - 2f64.atan());
+    assert!((after("tan(t) > -2", 3.0) - exact).abs() < 1e-5, "{}", after("tan(t) > -2", 3.0));
 }

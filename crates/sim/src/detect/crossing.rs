@@ -17,6 +17,9 @@ use dlsys_tree::SimTime;
 /// A difference of two sides counts as zero up to this many times the size of the sides.
 pub const TOUCH: f64 = 256.0 * f64::EPSILON;
 
+/// Sides that are this many times larger at the start of a path than in its middle begin at a pole.
+const POLE: f64 = 1e8;
+
 /// Residue that numerical trajectories may leave of zero, relative to the size of the sides or to 1.
 const NOISE: f64 = 1e-10;
 
@@ -368,6 +371,17 @@ impl CrossingDetector {
         path.departure(&mut self.departure);
         self.departure_out.resize(sides.outputs(), Dual::constant(0.0));
         sides.eval(&self.departure, &mut self.departure_scratch, &mut self.departure_out);
+    }
+
+    /// The tolerance of a path that begins at a pole, where sides are so large that all that follows would count as zero: that of the
+    /// middle of the path.
+    pub(super) fn away_from_pole(&mut self, path: &Path, atom: usize, tolerance: f64) -> f64 {
+        if tolerance <= TOUCH * POLE {
+            return tolerance;
+        }
+        self.difference(path, atom).value(0.5);
+        let there = self.out[2 * atom].abs().max(self.out[2 * atom + 1].abs());
+        if TOUCH * there * POLE < tolerance { TOUCH * there } else { tolerance }
     }
 
     /// The tolerance below which the difference counts as zero, if its bounds over the whole path admit a change of

@@ -129,6 +129,7 @@ impl Search<'_, '_> {
                         self.detector.measure(path);
                     }
                     if let Some(tolerance) = self.detector.may_change(path, atom, self.now[atom]) {
+                        let tolerance = self.detector.away_from_pole(path, atom, tolerance);
                         let near = atom < 64 && state.next.near & 1 << atom != 0;
                         let decides = self.decides(atom);
                         let ahead = self.look_ahead(atom, tolerance, 0.0, near, decides);

@@ -50,19 +50,21 @@ impl FunctionOfTime {
         out[0]
     }
 
-    fn at(&self, tau: f64) -> f64 {
+    /// The value itself at a time since the start.
+    pub fn at(&self, tau: f64) -> f64 {
         let time = [self.variables[self.time] + tau, self.variables[self.time + 1] + tau];
         self.evaluate(self.variables.clone(), |trajectory, x| trajectory.at(x, tau), time)
     }
 
-    /// The value itself, if the trajectory began at `x`.
-    pub fn directly(&self, x: f64, tau: f64) -> Option<f64> {
-        (x == self.start).then(|| self.at(tau))
+    /// Bounds of the value itself.
+    pub fn directly_over(&self, from: f64, to: f64) -> Interval {
+        self.bounds(from, to).value
     }
 
-    /// Bounds of the value itself.
-    pub fn directly_over(&self, x: f64, from: f64, to: f64) -> Option<Interval> {
-        (x == self.start).then(|| self.bounds(from, to).value)
+    /// True if the value at the start is this one, but for rounding.
+    #[inline]
+    pub fn begins_at(&self, x: f64) -> bool {
+        (x - self.start).abs() <= 64.0 * f64::EPSILON * self.start.abs()
     }
 
     /// The displacement at a time since the start.

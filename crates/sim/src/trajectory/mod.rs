@@ -48,7 +48,15 @@ impl Trajectory {
     #[inline]
     pub fn at(&self, x: f64, tau: f64) -> f64 {
         let value = x + self.value(tau);
-        if value.abs() < LITTLE * x.abs() { self.directly(x, tau).unwrap_or(value) } else { value }
+        let is_direct = value.abs() < LITTLE * x.abs() || self.begins_elsewhere(x);
+        if is_direct { self.directly(x, tau).unwrap_or(value) } else { value }
+    }
+
+    /// True for a function of time whose value at the start is not `x`: a steep one whose conditions have changed at an instant that is
+    /// rounded.
+    #[inline]
+    fn begins_elsewhere(&self, x: f64) -> bool {
+        matches!(self, Trajectory::Function(function) if !function.begins_at(x))
     }
 
     /// Bounds of value and rate from one time since the start, at which the value was `x`, to another; unbounded for dense output.
@@ -58,11 +66,12 @@ impl Trajectory {
         let value = Interval { lo: x + value.lo, hi: x + value.hi, ..value };
         let direct = || match self {
             Trajectory::Sum(sum) => sum.directly_over(x, from, to),
-            Trajectory::Function(function) => function.directly_over(x, from, to),
+            Trajectory::Function(function) => Some(function.directly_over(from, to)),
             // Monotonic.
             _ => Some(Interval::spanned(self.directly(x, from)?, self.directly(x, to)?)),
         };
-        let value = if value.magnitude() < LITTLE * x.abs() { direct().unwrap_or(value) } else { value };
+        let is_direct = value.magnitude() < LITTLE * x.abs() || self.begins_elsewhere(x);
+        let value = if is_direct { direct().unwrap_or(value) } else { value };
         Dual { value, rate }
     }
 
@@ -79,7 +88,7 @@ impl Trajectory {
             Trajectory::Riccati(law) => law.directly(x, tau),
             Trajectory::Sum(sum) => sum.directly(x, tau),
             Trajectory::Driven(driven) => driven.directly(x, tau),
-            Trajectory::Function(function) => function.directly(x, tau),
+            Trajectory::Function(function) => Some(function.at(tau)),
             _ => None,
         }
     }
