@@ -149,20 +149,20 @@ impl<'s> Tubes<'s> {
                 tubes.profiles.push(Profile::new(spokes));
                 tubes.profiles.len() - 1
             });
-            let fork = structure.fork(first).filter(|_| !style.steady);
-            let (begin, collar) = match (style.grown, fork) {
-                (true, Some(_)) => (Begin::Flat, None),
-                (true, None) => structure.beginning(scene, first, &style),
-                (false, _) => (Begin::Dome, None),
+            let fork = if style.steady { Vec::new() } else { structure.fork(segments, first) };
+            let (begin, collar) = match style.grown {
+                true if !fork.is_empty() => (Begin::Flat, None),
+                true => structure.beginning(scene, first, &style),
+                false => (Begin::Dome, None),
             };
-            members.splice(0..0, fork);
+            members.splice(0..0, fork.iter().copied());
             let radii = &structure.radii;
             let TubeStyle { accuracy, steady, .. } = style;
             let chain = Chain { segments, radii, members: &members, accuracy, steady };
             parts.clear();
             chain.parts(style.grown, collar.as_ref(), &mut parts);
-            if let Some(parent) = fork {
-                chain::begin_within(parent, first, segments[parent].direction, &mut parts);
+            if !fork.is_empty() {
+                chain::begin_within(&fork, first, segments, &mut parts);
             }
             let before = structure.before(segments, first);
             if let Some(&part) = parts.first().filter(|_| style.grown && before > 0.0) {

@@ -85,14 +85,24 @@ struct Taper {
 }
 
 impl Bend {
-    /// The middle of the stem at a length along the chain; `None` where it is on its segment.
+    /// The middle of the stem at a length along the chain; `None` where it is on its segment. Between the bend's own cross-sections the stem is
+    /// straight, so that one more there, where a segment ends, does not turn the others.
     fn place(&self, at: f64) -> Option<Point> {
         let u = 0.5 + 0.5 * (at - self.at) / self.reach;
         if !(u > 0.0 && u < 1.0) {
             return None;
         }
+        let number = 2.0 * self.pieces * u;
+        let (low, part) = (number.floor(), number.fract());
+        let on_curve = |number: f64| self.on_curve(0.5 * number / self.pieces);
+        let low_place = on_curve(low);
+        Some(low_place + (on_curve(low + 1.0) - low_place) * part)
+    }
+
+    /// A place of the parabola, from 0 at its beginning to 1.
+    fn on_curve(&self, u: f64) -> Point {
         let [before, after] = self.directions;
-        Some(self.point + (after * (u * u) - before * ((1.0 - u) * (1.0 - u))) * self.reach)
+        self.point + (after * (u * u) - before * ((1.0 - u) * (1.0 - u))) * self.reach
     }
 
     /// What it adds to the radius of a member at a length along the chain.
@@ -137,15 +147,18 @@ pub(super) fn reach_of_bend(directions: [Vector; 2], radius: f64) -> f64 {
     ROUNDING * radius * half / (1.0 - half * half).max(1e-6).sqrt()
 }
 
-/// Takes from the parts of a chain those of its first segment, `parent`, up to where it begins to turn or to taper into the next one,
-/// `first`: all of it is another tube's. What is left begins a little within that.
-pub(super) fn begin_within(parent: usize, first: usize, along: Vector, parts: &mut Vec<Part>) {
+/// Takes from the parts of a chain those of the straight `run` at its beginning up to where it begins to turn or to taper into the next
+/// segment, `first`: all of it is another tube's. What is left begins a little within that.
+pub(super) fn begin_within(run: &[usize], first: usize, segments: &[Segment], parts: &mut Vec<Part>) {
     /// The part of the other tube's radius.
     const WITHIN: f64 = 0.97;
-    if parts.first().is_some_and(|part| part.segment == parent && part.direction == along) {
-        parts.remove(0);
-    }
-    parts.iter_mut().take_while(|part| part.segment == parent).for_each(|part| part.segment = first);
+    let is_whole =
+        |part: &&Part| run.contains(&part.segment) && part.centres[1] == segments[part.segment].end;
+    let whole = parts.iter().take_while(is_whole).count();
+    // Up to the first cross-section between ends of segments.
+    let is_cut = parts.get(whole).is_some_and(|part| run.contains(&part.segment));
+    parts.drain(..whole + usize::from(is_cut));
+    parts.iter_mut().take_while(|part| run.contains(&part.segment)).for_each(|part| part.segment = first);
     if let Some(part) = parts.first_mut() {
         part.radii[0] *= WITHIN;
     }

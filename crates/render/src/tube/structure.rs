@@ -11,14 +11,6 @@ const GOES_ON: f64 = 0.5;
 /// A branch that is wider than the axis ever was by this ratio is no limb of it.
 const LIMB: f64 = 1.001;
 
-/// Whether two segments can share a ring. In drawings in which joints look `grown`, the thinner one widens to the thicker one, so that there
-/// is no shoulder, unless that is more than twice as thick.
-fn joins([a, b]: [&Segment; 2], radii: [f64; 2], grown: bool) -> bool {
-    let (thin, thick) = (radii[0].min(radii[1]), radii[0].max(radii[1]));
-    let blends = grown && thick <= (1.0 + chain::MOST) * thin;
-    can_join(a, b, if blends { [thick; 2] } else { radii })
-}
-
 /// Whether a stem of this radius that begins with a segment stands on a floor, or on the height 0 if there is none: it is cut there.
 pub(crate) fn stands(segment: &Segment, radius: f64, floor: Option<f64>) -> bool {
     let height = segment.start.y - floor.unwrap_or(0.0);
@@ -61,7 +53,7 @@ impl Structure {
                 && segments[before].contour == segment.contour
                 && radii[before][1] > 0.0
                 && radii[i][0] > 0.0
-                && joins([&segments[before], segment], [radii[before][1], radii[i][0]], grown)
+                && can_join(&segments[before], segment, [radii[before][1], radii[i][0]])
             {
                 next[before] = i;
                 continues[i] = true;
@@ -132,12 +124,46 @@ impl Structure {
         end > 0.0
             && width <= LIMB * widest[parent]
             && from.contour == to.contour
-            && joins([from, to], [end, width], true)
+            && self.can_bend(segments, [parent, branch])
     }
 
-    /// The segment at the end of which the tube bends away whose first segment this is.
-    pub(super) fn fork(&self, first: usize) -> Option<usize> {
-        self.forks.get(first).copied().filter(|parent| *parent != NONE)
+    /// Whether a branch can share the ring at the end of a segment. Where it is not much thinner or thicker, its width tapers through the bend, so that there
+    /// is no shoulder; and how stems are divided into segments makes no difference.
+    fn can_bend(&self, segments: &[Segment], [parent, branch]: [usize; 2]) -> bool {
+        let (from, to) = (&segments[parent], &segments[branch]);
+        let radii = [self.radii[parent][1], self.radii[branch][0]];
+        let (thin, thick) = (radii[0].min(radii[1]), radii[0].max(radii[1]));
+        if thick > (1.0 + chain::MOST) * thin {
+            return can_join(from, to, radii);
+        }
+        let length = |segment: &Segment| (segment.end - segment.start).norm();
+        let goes_straight =
+            |a: usize, b: usize| segments[a].direction.cross(&segments[b].direction).norm() < 1e-6;
+        let before = |at: &usize| segments[*at].follows.filter(|before| goes_straight(*before, *at));
+        let after =
+            |at: &usize| Some(self.ahead[*at]).filter(|after| *after != NONE && goes_straight(*at, *after));
+        let back: f64 = std::iter::successors(Some(parent), before).map(|i| length(&segments[i])).sum();
+        let on: f64 = std::iter::successors(Some(branch), after).map(|i| length(&segments[i])).sum();
+        let as_long = |segment: &Segment, length: f64| Segment {
+            end: segment.start + segment.direction * length,
+            ..segment.clone()
+        };
+        can_join(&as_long(from, back), &as_long(to, on), [thick; 2])
+    }
+
+    /// The straight run of segments at the end of which the tube bends away whose first segment this is; empty where none does so.
+    pub(super) fn fork(&self, segments: &[Segment], first: usize) -> Vec<usize> {
+        let Some(parent) = self.forks.get(first).copied().filter(|parent| *parent != NONE) else {
+            return Vec::new();
+        };
+        let along = segments[parent].direction;
+        let before = |at: &usize| {
+            let before = segments[*at].follows.filter(|before| self.next[*before] == *at)?;
+            (segments[before].direction.cross(&along).norm() < 1e-6).then_some(before)
+        };
+        let mut run: Vec<usize> = std::iter::successors(Some(parent), before).collect();
+        run.reverse();
+        run
     }
 
     /// The segment that this one comes out of as a branch.
