@@ -23,7 +23,6 @@ mod methods;
 mod one_step;
 mod rates;
 mod roots;
-mod share;
 mod sparse;
 mod stepper;
 mod workspace;

@@ -161,11 +161,6 @@ impl Stepper {
         self.scheme.unwrap_or(Scheme::Dopri5)
     }
 
-    /// Lets so many threads share the components where explicit methods add up rates. Results do not depend on it.
-    pub fn set_threads(&mut self, threads: usize) {
-        self.work.threads = threads;
-    }
-
     /// True if the implicit method was taken for some step so far.
     pub fn has_been_implicit(&self) -> bool {
         self.has_been_implicit

@@ -43,8 +43,6 @@ pub struct Workspace {
     pub(crate) evaluations: u64,
     /// The components, in ascending order, that err by more than is tolerated in the step just tried, and are to be integrated again.
     pub(crate) rough: Vec<u32>,
-    /// So many threads share the components of sums over stages.
-    pub(crate) threads: usize,
 }
 
 impl Workspace {

@@ -82,7 +82,6 @@ mod scratch;
 mod settings;
 mod setup;
 mod surroundings;
-mod threads;
 mod trajectory;
 mod world;
 

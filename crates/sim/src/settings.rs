@@ -116,7 +116,7 @@ pub struct Settings {
     /// More bytes of memory than this, of the process as a whole where the system tells them, are an error. By
     /// default only as much as the system does not have.
     pub max_memory: u64,
-    /// Threads that compute the lives of modules that read no others, and the steps of many that do. Results do not depend on it.
+    /// Threads that compute the lives of modules that read no others. Results do not depend on it.
     pub threads: usize,
     /// Modules from which on threads share them: the lives of fewer are computed before threads have begun (differential tests).
     #[doc(hidden)]

@@ -1,7 +1,7 @@
-//! Steps of modules that are integrated alone, and of many that are integrated together.
+//! Steps of modules that are integrated alone, or with neighbours.
 
 use dlsys_session::Session;
-use dlsys_sim::{Method, Settings};
+use dlsys_sim::Settings;
 
 /// x' = 1 + sin(x)/2 from 0 to 3, again and again.
 const LIVES: &str =
@@ -28,37 +28,6 @@ fn no_step_is_rejected_once_some_lives_are_known() {
         assert_eq!((stats.events - known.events, stats.rejected - known.rejected), (40, 0), "{tolerance:e}");
         let last = simulation.take_events().last().expect("50 events").time;
         assert!((last / 50.0 - life()).abs() <= 2.0 * tolerance, "{tolerance:e}: {last}");
-    }
-}
-
-/// Cells of two kinds in a row, each with two rates that read both neighbours; some of them divide, and new values come with that.
-const CELLS: &str = "initial string: E for i in 1 .. 101: ( A(0.01*i, 1 + 0.3*sin(i)) B(1, 0.02*i) B(0.9 + 0.01*i, 0.2) ) E\n\
-    A(x_l, c_l) < A(x, c) > B(x_r, c_r):\n  if x < 1.2 solve dx/dt = 0.1*c*x, dc/dt = 0.2*(c_r - c) - 0.01*c*c\n  \
-      if x >= 1.2 produce A(0.5, c) B(0.3, c/2) B(0.4, c/2)\n\
-    B(x_l, c_l) < A(x, c) > B(x_r, c_r):\n  if x < 1.2 solve dx/dt = 0.1*c*x, dc/dt = 0.2*(c_l + c_r - 2*c) - 0.01*c*c\n  \
-      if x >= 1.2 produce A(0.5, c) B(0.3, c/2) B(0.4, c/2)\n\
-    A(x_l, c_l) < B(x, c) > B(x_r, c_r): solve dx/dt = 0.05*(x_r - x), dc/dt = 0.3*(c_l + c_r - 2*c)/(1 + c*c)\n\
-    B(x_l, c_l) < B(x, c) > A(x_r, c_r): solve dx/dt = 0.05*(x_l - x), dc/dt = 0.3*(c_l + c_r - 2*c)/(1 + c*c)\n";
-
-/// Threads share the components of a common step, and the rates of modules with one program: to the same bits.
-#[test]
-fn steps_that_threads_share_are_the_same() {
-    let session = Session::from_text("cells.dls", CELLS, &[]).expect("a model");
-    for (method, tolerance) in [(Method::Auto, 1e-5), (Method::Dopri5, 1e-4), (Method::Dop853, 1e-8)] {
-        let run = |threads: usize| {
-            let settings = Settings { method, tolerance, threads, threads_from: 0, ..Settings::default() };
-            let mut simulation = session.simulate(settings).expect("it starts");
-            let mut string = Default::default();
-            simulation.at(4.0, &mut string).expect("it runs");
-            let bits =
-                string.iter().flat_map(|m| m.parameters.iter().map(|x| x.to_bits()).collect::<Vec<_>>());
-            (bits.collect::<Vec<_>>(), simulation.stats())
-        };
-        let (alone, stats) = run(1);
-        assert!(stats.events > 10 && stats.steps > 3, "{stats:?}");
-        for threads in [2, 3, 7] {
-            assert_eq!(run(threads), (alone.clone(), stats), "{method:?}, {threads} threads");
-        }
     }
 }
 

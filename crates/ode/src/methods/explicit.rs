@@ -11,11 +11,9 @@ use super::dop853::join_estimates;
 use crate::Rates;
 use crate::dense::Dense;
 use crate::one_step::{InteriorError, Nodes, OneStep, Step, Trial};
-use crate::share::{each_part, each_range};
 use crate::workspace::{FLOOR, MAX_STAGES, PART, Workspace, part};
 use dlsys_expr::SimTime;
 use std::marker::PhantomData;
-use std::ops::Range;
 
 /// An explicit Runge-Kutta pair with dense output, for `y' = f(t, y)` and steps of length `h`.
 ///
@@ -154,11 +152,6 @@ impl<P: Pair> OneStep for Explicit<P> {
     }
 }
 
-/// The larger of two errors; none is larger than one that is no number.
-fn larger(error: f64, other: f64) -> f64 {
-    if other > error || other.is_nan() { other } else { error }
-}
-
 /// So few components are summed one by one, in the same order as many.
 const FEW: usize = 2;
 
@@ -270,7 +263,7 @@ impl Workspace {
 
     /// The state at which a stage's rate is taken, given its weights.
     fn combine<W: Weights>(&mut self, n: usize, h: f64) {
-        let Workspace { from, stage, k, threads, .. } = self;
+        let Workspace { from, stage, k, .. } = self;
         if n <= FEW {
             for (j, (s, y)) in stage.iter_mut().zip(from).enumerate().take(n) {
                 *s = *y + h * weighed::<W>(k, j);
@@ -279,14 +272,12 @@ impl Workspace {
         }
         let (from, stage) = (from.as_chunks::<PART>().0, stage.as_chunks_mut::<PART>().0);
         let k = parts::<W>(k, from.len());
-        each_part(*threads, stage, |first, stage| {
-            for (block, (from, stage)) in (first..).zip(from[first..].iter().zip(stage)) {
-                let sums = weigh::<W>(&k, block);
-                for i in 0..PART {
-                    stage[i] = from[i] + h * sums[i];
-                }
+        for (block, (from, stage)) in from.iter().zip(stage).enumerate() {
+            let sums = weigh::<W>(&k, block);
+            for i in 0..PART {
+                stage[i] = from[i] + h * sums[i];
             }
-        });
+        }
     }
 
     /// An estimate of the step times the largest rate of decay: two states at the end of the step and the
@@ -299,26 +290,14 @@ impl Workspace {
     }
 
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
-    fn error<P: Pair>(&self, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
-        let (blocks, errors) = (n.div_ceil(PART), |blocks| self.error_of_parts::<P>(blocks, n, h, tolerance));
-        if self.threads <= 1 {
-            return errors(0..blocks);
-        }
-        let largest =
-            |(error, rounding), (other, of_other)| (larger(error, other), f64::max(rounding, of_other));
-        each_range(self.threads, blocks, errors).into_iter().fold((0.0, 0.0), largest)
-    }
-
-    /// The same of the components of some parts.
-    fn error_of_parts<P: Pair>(&self, blocks: Range<usize>, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
+    fn error<P: Pair>(&mut self, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
         let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
         let blur = 4.0 * self.resolution / P::TABLEAU.c[1];
         // The last stage is the end of the step.
         let (from, end) = (self.from.as_chunks::<PART>().0, self.stage.as_chunks::<PART>().0);
         let high = parts::<EstimateOf<P, 0>>(&self.k, from.len());
         let low = parts::<EstimateOf<P, 1>>(&self.k, from.len());
-        let values = from[blocks.clone()].iter().zip(&end[blocks.clone()]);
-        for (block, (from, end)) in blocks.zip(values) {
+        for (block, (from, end)) in from.iter().zip(end).enumerate() {
             let first = block * PART;
             let mut estimate = self.estimates::<EstimateOf<P, 0>>(&high, n, block);
             if P::TABLEAU.e.len() > 1 {
@@ -350,7 +329,7 @@ impl Workspace {
             }
             for (ratio, other) in ratios.into_iter().zip(roundings).take(n - first) {
                 rounding = rounding.max(other);
-                error = larger(error, ratio);
+                error = if ratio > error || ratio.is_nan() { ratio } else { error };
             }
         }
         (error, rounding)

@@ -8,8 +8,7 @@
 //! - [`lanes`]: the lives of some newborns at once, by the functions of `flow::prediction`; [`straight`]: those without curves
 //! - [`plan`]: the chains of a stretch of time, without a change of anything
 //! - [`order`]: the productions of all chains, sorted
-//!
-//! Both use several [threads](crate::threads), as many as [`Settings::threads`](crate::Settings::threads) allows.
+//! - [`threads`]: both on several threads, as many as [`Settings::threads`](crate::Settings::threads) allows
 //!
 //! The queue of events ([`Schedule`](crate::schedule)) is the general way, and decides whatever is unusual: two productions at nearly one
 //! instant, successors that end at birth, short lives, errors, limits. A plan ends before the first such thing. The results are
@@ -20,6 +19,7 @@ mod law;
 mod order;
 mod plan;
 mod straight;
+mod threads;
 
 use crate::kernel::Simulation;
 use crate::log::Event;

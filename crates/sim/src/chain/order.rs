@@ -3,8 +3,8 @@
 use dlsys_tree::SimTime;
 use std::cmp::Ordering;
 
+use super::threads;
 use crate::schedule::sort_by_time;
-use crate::threads;
 
 /// A production of a chain.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,8 +11,8 @@ use dlsys_tree::{Family, Lineage, NO_LABEL, SimTime, Tree};
 use super::lanes::{Block, Fate};
 use super::law::Law;
 use super::order::Happened;
+use super::threads;
 use crate::event::SHORT_LIFE;
-use crate::threads;
 use crate::world::life::Lives;
 
 /// Runners that are followed together.

@@ -58,11 +58,6 @@ impl Integrator {
         self.stepper.is_unwatched = is_unwatched;
     }
 
-    /// Lets so many threads share the components of a step. Results do not depend on it.
-    pub fn set_threads(&mut self, threads: usize) {
-        self.stepper.set_threads(threads);
-    }
-
     /// True if nothing is searched for inside steps.
     pub fn is_unwatched(&self) -> bool {
         self.stepper.is_unwatched

@@ -3,7 +3,6 @@
 //! For each variable that the program reads, a [`LaneColumn`] holds the sources of that variable in all rows of a chunk.
 
 use crate::flow::coupled::rows::{EquationRow, EquationTable, VariableSource};
-use crate::threads;
 use dlsys_expr::{LANES, Lanes, Program};
 use dlsys_model::Rule;
 use smallvec::SmallVec;
@@ -22,8 +21,6 @@ pub struct LaneBatches {
     others: Vec<(u32, VariableSource)>,
     /// The first column of the chunk that has begun.
     first_column: usize,
-    /// So many threads share the chunks.
-    threads: usize,
 }
 
 /// What tells the program of a row's rates.
@@ -249,11 +246,6 @@ impl LaneBatches {
         LaneColumn::Mixed(place, mixed, others.len())
     }
 
-    /// Lets so many threads share the evaluations. Rates do not depend on it.
-    pub fn share(&mut self, threads: usize) {
-        self.threads = threads;
-    }
-
     /// Evaluates the rates of all rows, and writes them to their components in `out`.
     pub fn rates(
         &self,
@@ -263,41 +255,7 @@ impl LaneBatches {
         registers: &mut Vec<Lanes>,
         out: &mut [f64],
     ) {
-        if self.threads <= 1 {
-            let write = |chunk: &Chunk, output, rates: &[f64]| self.write(chunk, output, rates, out);
-            return self.evaluate(&self.chunks, table, rules, point, registers, write);
-        }
-        let size = self.chunks.len().div_ceil(self.threads).max(1);
-        let parts: SmallVec<[&[Chunk]; 16]> = self.chunks.chunks(size).collect();
-        let found = threads::each(self.threads, parts.len(), |number| {
-            let mut found = Vec::with_capacity(LANES * size);
-            let note = |_: &Chunk, _, rates: &[f64]| found.extend_from_slice(rates);
-            self.evaluate(parts[number], table, rules, point, &mut Vec::new(), note);
-            found
-        });
-        for (chunks, found) in parts.iter().zip(&found) {
-            let mut found = &found[..];
-            for chunk in *chunks {
-                for output in 0..chunk.key.program(rules).outputs() {
-                    let (rates, others) = found.split_at(chunk.rows);
-                    self.write(chunk, output, rates, out);
-                    found = others;
-                }
-            }
-        }
-    }
-
-    /// Evaluates the rates of some chunks: calls `put` with the chunk, the number of the rate, and the rates of its rows.
-    fn evaluate(
-        &self,
-        chunks: &[Chunk],
-        table: &EquationTable,
-        rules: &[Rule],
-        point: &EvaluationPoint,
-        registers: &mut Vec<Lanes>,
-        mut put: impl FnMut(&Chunk, usize, &[f64]),
-    ) {
-        for chunk in chunks {
+        for chunk in &self.chunks {
             let program = chunk.key.program(rules);
             if registers.len() < chunk.registers {
                 registers.resize(chunk.registers, [0.0; LANES]);
@@ -307,19 +265,14 @@ impl LaneBatches {
                 self.gather(table, *column, point, register);
             }
             for (output, register) in program.eval_rows(registers, chunk.rows).enumerate() {
-                put(chunk, output, &registers[register][..chunk.rows]);
-            }
-        }
-    }
-
-    /// Writes one of the rates of the rows of a chunk to their components.
-    #[inline(always)]
-    fn write(&self, chunk: &Chunk, output: usize, rates: &[f64], out: &mut [f64]) {
-        match chunk.rates {
-            LanePlaces::Run(first) => out[first + output..][..rates.len()].copy_from_slice(rates),
-            LanePlaces::Any(first) => {
-                for (rate, place) in rates.iter().zip(&self.places[first..]) {
-                    out[*place as usize + output] = *rate;
+                let rates = &registers[register][..chunk.rows];
+                match chunk.rates {
+                    LanePlaces::Run(first) => out[first + output..][..chunk.rows].copy_from_slice(rates),
+                    LanePlaces::Any(first) => {
+                        for (rate, place) in rates.iter().zip(&self.places[first..]) {
+                            out[*place as usize + output] = *rate;
+                        }
+                    }
                 }
             }
         }

@@ -16,10 +16,6 @@ use dlsys_tree::{ModuleId, SimTime, Visit};
 /// A solution without steps begins anew, for all modules, at every event; after this many events steps are made.
 const MAX_CUTS: u32 = 2;
 
-/// A common step of so many components, in units of [`Settings::threads_from`](crate::Settings::threads_from), is shared by threads: they begin anew for
-/// each stage.
-const LARGE: usize = 4;
-
 impl FlowStage<'_, '_> {
     /// Begins the common trajectory of the coupled modules at an instant.
     pub fn restart_coupled(&mut self, at: SimTime) -> Result<(), Error> {
@@ -124,11 +120,7 @@ impl FlowStage<'_, '_> {
             if !system.is_bare {
                 system.prepare_rates(rules);
             }
-            let settings = &self.setup.settings;
-            let threads = if y.len() < LARGE * settings.threads_from { 1 } else { settings.threads };
-            system.lanes.share(threads);
-            integrator.set_threads(threads);
-            integrator.restart(settings.method, y.len());
+            integrator.restart(self.setup.settings.method, y.len());
         }
     }
 
