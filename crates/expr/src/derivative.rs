@@ -187,7 +187,8 @@ impl Graph {
         self.binary(Binary::Mul, a, b)
     }
 
-    pub(super) fn plus(&mut self, a: NodeId, b: NodeId) -> NodeId {
+    /// A sum, without terms that are 0.
+    pub fn plus(&mut self, a: NodeId, b: NodeId) -> NodeId {
         match (self.is_zero(a), self.is_zero(b)) {
             (true, _) => b,
             (_, true) => a,

@@ -275,22 +275,24 @@ impl Graph {
                 Node::Element(array, i) => Node::Element(array, new[&i]),
                 Node::Field(field, part, at) => Node::Field(field, part, at.map(|of| new[&of])),
             };
-            let image = match replace(self, id, rebuilt) {
-                Some(image) => image,
-                None => match rebuilt {
-                    Node::Const(_) | Node::Var(_) => id,
-                    Node::Unary(op, a) => self.unary(op, a),
-                    Node::Binary(op, a, b) => self.binary(op, a, b),
-                    Node::Select(c, a, b) => self.select(c, a, b),
-                    Node::Curve(curve, part, x) => self.curve(curve, part, x),
-                    Node::Piece(curve, part, i, x) => self.piece(curve, part, i, x),
-                    Node::Element(array, i) => self.element(array, i),
-                    Node::Field(field, part, at) => self.field(field, part, at),
-                },
-            };
+            let image = replace(self, id, rebuilt).unwrap_or_else(|| self.add(id, rebuilt));
             new.insert(id, image);
         }
         roots.iter().map(|r| new[r]).collect()
+    }
+
+    /// A node with other operands than `id` has: folded like one that is built by its own function.
+    pub fn add(&mut self, id: NodeId, node: Node) -> NodeId {
+        match node {
+            Node::Const(_) | Node::Var(_) => id,
+            Node::Unary(op, a) => self.unary(op, a),
+            Node::Binary(op, a, b) => self.binary(op, a, b),
+            Node::Select(c, a, b) => self.select(c, a, b),
+            Node::Curve(curve, part, x) => self.curve(curve, part, x),
+            Node::Piece(curve, part, i, x) => self.piece(curve, part, i, x),
+            Node::Element(array, i) => self.element(array, i),
+            Node::Field(field, part, at) => self.field(field, part, at),
+        }
     }
 
     /// All expressions that `roots` are built from, operands first.

@@ -165,19 +165,35 @@ pub struct Solve {
 /// are polynomials in what a step resolves have none.
 #[derive(Clone, Debug, Default)]
 pub struct Pulses {
-    /// The terms of rates that are integrated numerically, one output each.
-    pub rates: Program,
+    /// The terms of rates that are integrated numerically.
+    pub rates: PulseTerms,
     /// The terms of rates with formulas, which are integrated numerically only if all are.
-    pub formula_rates: Program,
-    /// The terms of values, one output each.
-    pub values: Program,
+    pub formula_rates: PulseTerms,
+    /// The terms of values.
+    pub values: PulseTerms,
 }
 
 impl Pulses {
     /// True if no term may have pulses.
     pub fn is_empty(&self) -> bool {
-        [&self.rates, &self.formula_rates, &self.values].iter().all(|terms| terms.outputs() == 0)
+        [&self.rates, &self.formula_rates, &self.values].iter().all(|terms| terms.terms.outputs() == 0)
     }
+}
+
+/// Terms of some expressions, each of which is a rate or a value, that may have pulses.
+#[derive(Clone, Debug, Default)]
+pub struct PulseTerms {
+    /// One output each. First those of which the expressions are sums, then those of sums inside functions and products, and of equations `0 = g`.
+    pub terms: Program,
+    /// The number of terms of the first sort: an expression changes by as much as such a term does.
+    pub outer: usize,
+    /// The expressions, with one more variable for each term behind all others, which is added to that term. In place of g, which are the last, stands an
+    /// estimate of the change of the unknown: g divided by the sizes of its partial derivatives.
+    pub disturbed: Program,
+    /// The parameter that has each expression for a rate or a value.
+    pub parameters: Vec<usize>,
+    /// The number of expressions that are no equations.
+    pub explicit: usize,
 }
 
 /// A condition inside an equation. A variable replaces it there, so that the equation is smooth between the instants at

@@ -152,11 +152,6 @@ impl Stepper {
         self.schemes.nodes(self.scheme())
     }
 
-    /// The rates at the start of the step just made.
-    pub fn rates_at_start(&self) -> &[f64] {
-        self.work.rates_at_start()
-    }
-
     fn scheme(&self) -> Scheme {
         self.scheme.unwrap_or(Scheme::Dopri5)
     }

@@ -9,7 +9,7 @@
 //! nothing. Those of one term do.
 
 use dlsys_expr::{Binary, Graph, Node, NodeId, Program, Unary};
-use dlsys_model::{Kinds, Pattern, Pulses, SolutionForm};
+use dlsys_model::{Kinds, Pattern, PulseTerms, Pulses, SolutionForm};
 
 use super::RuleAnalysis;
 use super::variability::Moving;
@@ -99,29 +99,129 @@ impl Surroundings<'_> {
             .filter(|(_, term)| clause.varies(graph, *term, true))
             .map(|(i, _)| (declared.first_aggregate + i) as u32)
             .collect();
-        let mut terms = |node: NodeId, by_pace: bool| -> Vec<NodeId> {
-            let mut found = summands(graph, node, &|v| clause.moves(v as usize));
-            let is_hazy = |graph: &Graph, term| graph.variables(&[term]).iter().any(|v| hazy.contains(v));
-            found.retain(|term| is_hazy(graph, *term) || clause.varies(graph, *term, by_pace));
-            found
+        let mut finder =
+            Finder { clause: &clause, hazy: &hazy, total: declared.variables + solve.switches.len() };
+        let rates = |closed: bool| -> Vec<(usize, NodeId)> {
+            let forms = solve.rates.iter().zip(solution_forms);
+            forms.filter(|(_, form)| form.is_closed() == closed).map(|(rate, _)| *rate).collect()
         };
-        let (mut rates, mut formula_rates) = (Vec::new(), Vec::new());
-        for ((_, node), form) in solve.rates.iter().zip(solution_forms) {
-            let kept = if form.is_closed() { &mut formula_rates } else { &mut rates };
-            kept.extend(terms(*node, !form.is_closed()));
-        }
-        let explicit = solve.algebraic.iter().filter(|entry| entry.explicit);
-        let values: Vec<NodeId> = explicit.flat_map(|entry| terms(entry.node, true)).collect();
-        let total = declared.variables + solve.switches.len();
         Pulses {
-            rates: Program::compile(graph, &rates, total),
-            formula_rates: Program::compile(graph, &formula_rates, total),
-            values: Program::compile(graph, &values, total),
+            rates: finder.terms(graph, &rates(false), &[], true),
+            formula_rates: finder.terms(graph, &rates(true), &[], false),
+            values: finder.values(graph),
         }
     }
 }
 
+/// Finds the terms of expressions of a clause that may have pulses.
+struct Finder<'c> {
+    clause: &'c Clause<'c>,
+    /// The variables of aggregates that may have pulses.
+    hazy: &'c [u32],
+    /// The number of variables that the expressions read.
+    total: usize,
+}
+
+impl Finder<'_> {
+    /// The terms of some expressions, with the parameters whose rates or values they are, and of some equations, with the estimate of what each tells of its
+    /// unknown. `by_pace`: what a step does not resolve counts.
+    fn terms(
+        &mut self,
+        graph: &mut Graph,
+        expressions: &[(usize, NodeId)],
+        equations: &[(usize, NodeId, NodeId)],
+        by_pace: bool,
+    ) -> PulseTerms {
+        let (mut outer, mut inner) = (Vec::new(), Vec::new());
+        for (position, (_, node)) in expressions.iter().enumerate() {
+            let found = summands(graph, *node, &|v| self.clause.moves(v as usize));
+            let found: Vec<NodeId> =
+                found.into_iter().filter(|term| self.has(graph, *term, by_pace)).collect();
+            outer.extend(found.into_iter().map(|term| (position, term)));
+        }
+        let roots: Vec<NodeId> =
+            expressions.iter().map(|e| e.1).chain(equations.iter().map(|e| e.1)).collect();
+        for term in self.inner_summands(graph, &roots) {
+            if outer.iter().all(|(_, known)| *known != term) && self.has(graph, term, by_pace) {
+                inner.push(term);
+            }
+        }
+        if outer.is_empty() && inner.is_empty() {
+            return PulseTerms::default();
+        }
+        let changes: Vec<NodeId> =
+            expressions.iter().map(|e| e.1).chain(equations.iter().map(|e| e.2)).collect();
+        let mut disturbed = graph.rewrite(&changes, |graph, id, node| {
+            let number = inner.iter().position(|term| *term == id)?;
+            let (term, more) = (graph.add(id, node), graph.var((self.total + outer.len() + number) as u32));
+            Some(graph.binary(Binary::Add, term, more))
+        });
+        for (number, (position, _)) in outer.iter().enumerate() {
+            let more = graph.var((self.total + number) as u32);
+            disturbed[*position] = graph.binary(Binary::Add, disturbed[*position], more);
+        }
+        let all: Vec<NodeId> = outer.iter().map(|(_, term)| *term).chain(inner).collect();
+        let owners = expressions.iter().map(|e| e.0).chain(equations.iter().map(|e| e.0));
+        PulseTerms {
+            terms: Program::compile(graph, &all, self.total),
+            outer: outer.len(),
+            disturbed: Program::compile(graph, &disturbed, self.total + all.len()),
+            parameters: owners.collect(),
+            explicit: expressions.len(),
+        }
+    }
+
+    /// The terms of the values of the clause. What is solved for tells nothing about pulses in its own equation.
+    fn values(&mut self, graph: &mut Graph) -> PulseTerms {
+        let of = |explicit: bool| {
+            let entries = self.clause.solve.algebraic.iter().filter(move |entry| entry.explicit == explicit);
+            entries.map(|entry| (entry.parameter, entry.node)).collect::<Vec<_>>()
+        };
+        let (explicit, implicit) = (of(true), of(false));
+        let mut equations = Vec::with_capacity(implicit.len());
+        for &(parameter, node) in &implicit {
+            let mut size = graph.constant(0.0);
+            for &(unknown, _) in &implicit {
+                let partial = graph.derivative(node, unknown as u32);
+                let partial = graph.unary(Unary::Abs, partial);
+                size = graph.plus(size, partial);
+            }
+            equations.push((parameter, node, graph.binary(Binary::Div, node, size)));
+        }
+        let resting: Paces = (self.clause.paces.iter())
+            .filter(|(parameter, _)| implicit.iter().all(|(unknown, _)| unknown != parameter))
+            .copied()
+            .collect();
+        let clause = Clause { paces: &resting, ..*self.clause };
+        Finder { clause: &clause, ..*self }.terms(graph, &explicit, &equations, true)
+    }
+
+    /// True if a term may have pulses.
+    fn has(&self, graph: &mut Graph, term: NodeId, by_pace: bool) -> bool {
+        graph.variables(&[term]).iter().any(|v| self.hazy.contains(v))
+            || self.clause.varies(graph, term, by_pace)
+    }
+
+    /// The terms of all sums in some expressions.
+    fn inner_summands(&self, graph: &mut Graph, roots: &[NodeId]) -> Vec<NodeId> {
+        let mut all = Vec::new();
+        for id in graph.reachable(roots) {
+            if let Node::Binary(Binary::Add | Binary::Sub, a, b) = graph.node(id) {
+                all.extend(
+                    [a, b].map(|term| without_factor(graph, term, &|v| self.clause.moves(v as usize))),
+                );
+            }
+        }
+        all.sort_unstable();
+        all.dedup();
+        let is_sum = |id: &NodeId| matches!(graph.node(*id), Node::Binary(Binary::Add | Binary::Sub, ..));
+        all.retain(|id| !is_sum(id));
+        all
+    }
+}
+
 /// A clause with the variation of all that it reads.
+#[derive(Clone, Copy)]
 struct Clause<'c> {
     around: &'c Surroundings<'c>,
     solve: &'c DeclaredSolve,
@@ -161,6 +261,19 @@ impl Clause<'_> {
         };
         let any = || graph.variables(&[term]).into_iter().any(|v| self.pace(v as usize) == Pace::Any);
         by_pace && (any() || all.terms.keys().any(|powers| exponential(powers) > 1))
+    }
+}
+
+/// A term without its sign and the factors in which nothing moves.
+fn without_factor(graph: &Graph, mut node: NodeId, moves: &dyn Fn(u32) -> bool) -> NodeId {
+    let rests = |node| !graph.variables(&[node]).into_iter().any(moves);
+    loop {
+        node = match graph.node(node) {
+            Node::Unary(Unary::Neg, a) => a,
+            Node::Binary(Binary::Mul, a, b) if rests(a) => b,
+            Node::Binary(Binary::Mul | Binary::Div, a, b) if rests(b) => a,
+            _ => return node,
+        };
     }
 }
 

@@ -13,30 +13,38 @@
 //! Fields ([`dlsys_expr::Field`]) are held at the middle of a piece, too: they do not vary on less than the time that they give, and steps of equations that read
 //! them are no longer than some of that ([`World::resolved`]).
 //!
-//! In stiff equations bounds of a whole rate carry no information: large terms cancel each other, and the rates of two states a tolerance apart may
-//! differ by any amount. There the terms that may have pulses are bounded one by one and compared with themselves at the stages. A term may still be a steep
+//! A pulse may stand beside something larger, so what is bounded are the terms of sums, in the rates and inside functions and products in them. Each is compared
+//! with its own change: where its bounds go beyond the range of its values at the stages by far more than that range, they show what no stage has seen.
+//! What that does to a rate is measured: the rate is evaluated with the term as it may be.
+//!
+//! The value of a neighbour that follows a formula hides its terms, so those are examined along with the equations that read it.
+//!
+//! In stiff equations terms are compared with their sizes at the stages: the rates of two states a tolerance apart may
+//! differ by any amount. A term may still be a steep
 //! function of a difference of two values that move together, so it is bounded by its value in the middle of a piece and its derivative along the dense
 //! output, too, in which the two rates cancel: the excess of that bound falls with the square of the piece.
-//!
-//! In all equations a pulse may stand beside something larger, so each such term is also compared with its own change: where its bounds go beyond the
-//! range of its values at the stages by far more than that range, they show what no stage has seen.
 //!
 //! Steps whose rates cannot be bounded are counted; `run --stats` and `explain` report their rules.
 
 use smallvec::SmallVec;
 
+use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::path::Path;
 use crate::world::state::State;
 use dlsys_expr::{Dual, Held, Interval, Program, Scratch};
-use dlsys_model::{Rule, Solve};
+use dlsys_model::{PulseTerms, Rule, Solve};
 use dlsys_ode::Dense;
-use dlsys_tree::SimTime;
+use dlsys_tree::{ModuleId, SimTime};
 
-/// A rate may be overlooked where its bound is this many times larger than all its values at the stages.
+/// A pulse may be overlooked where the bounds of a term go beyond its range at the stages by this many times that range; in stiff equations, where they are
+/// this many times larger than all its values there.
 const SURPRISE: f64 = 8.0;
-/// A pulse may be overlooked where the bounds of a term go beyond its range at the stages by this many times that range.
-const SURPRISING_CHANGE: f64 = 8.0;
+/// Positions between the stages of all methods at which rates are compared with those of the dense output.
+const BETWEEN: [f64; 2] = [0.16, 0.55];
+/// The difference of these rates that is no surprise, times the length of the step, in tolerances. Smooth rates have differences up to 4, fast waves 12;
+/// a step over a pulse has some hundreds.
+const DEFECT: f64 = 20.0;
 /// Pieces narrower than this part of a step are not halved any more.
 const NARROW: f64 = 1.0 / 256.0;
 /// Most pieces of a step that are examined.
@@ -67,9 +75,12 @@ impl PulseFinding {
 }
 
 /// A step of a module's equations that is to be examined.
+#[derive(Clone, Copy)]
 pub struct ExaminedStep<'p> {
     /// The world before the step, with the solution of the coupled modules.
     pub world: &'p World,
+    /// The rules of the model.
+    pub rules: &'p [Rule],
     /// The module, its rule and its active equations.
     pub state: &'p State,
     /// See `state`.
@@ -84,22 +95,58 @@ pub struct ExaminedStep<'p> {
     pub nodes: &'p [f64],
     /// The dense output, if the module is integrated alone; else it is that of the coupled modules.
     pub own: Option<&'p Dense>,
-    /// The rates at the start, if that is one of the nodes and the module is integrated alone.
-    pub at_start: Option<&'p [f64]>,
     /// The largest contribution to the values that may be overlooked.
     pub tolerance: f64,
     /// The equations are stiff: their terms are examined one by one.
     pub stiff: bool,
 }
 
+impl ExaminedStep<'_> {
+    /// True if a value, or a rate times the length of the step, differs from that of the dense output by more than it does where all is smooth.
+    fn is_far(&self, a: f64, b: f64, size: f64) -> bool {
+        (a - b)
+            .abs()
+            .partial_cmp(&(DEFECT * self.tolerance * size.abs().max(1.0)))
+            .is_none_or(|order| order.is_gt())
+    }
+}
+
+/// A step of a module that reads another one, and the first variable of that one in its equations.
+#[derive(Clone, Copy)]
+struct Reader<'r> {
+    step: &'r ExaminedStep<'r>,
+    offset: usize,
+}
+
+/// Terms of a step that are examined.
+struct Examination<'e> {
+    step: &'e ExaminedStep<'e>,
+    terms: &'e PulseTerms,
+    /// An expression that lasts for the whole step contributes so many times its size to the values.
+    scale: f64,
+    /// The step whose values count, if not those of the module itself.
+    reader: Option<Reader<'e>>,
+}
+
+/// The positions of a step at which the ranges of terms have been sampled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
+enum Sampled {
+    #[default]
+    Nowhere,
+    Ends,
+    Stages,
+}
+
 /// Bounds rates along steps. The fields are working memory.
 #[derive(Clone, Debug, Default)]
 pub struct PulseDetector {
+    /// The range of each term at the positions that have been sampled.
+    ranges: Vec<Interval>,
+    sampled: Sampled,
     values: Vec<f64>,
     bounds: Vec<Interval>,
-    seen: Vec<f64>,
-    ranges: Vec<Interval>,
     out: Vec<f64>,
+    changed: Vec<f64>,
     bounds_out: Vec<Interval>,
     scratch: Scratch<f64>,
     bounds_scratch: Scratch<Interval>,
@@ -112,113 +159,121 @@ pub struct PulseDetector {
 }
 
 impl PulseDetector {
-    /// Bounds the rates of the module's equations, and its values that are solved for, along a step, and compares them
-    /// with the values at the stages.
+    /// Bounds the terms of the module's equations, and of its values that are solved for, along a step, and compares them
+    /// with their values at the stages.
     pub fn examine(&mut self, step: &ExaminedStep) -> PulseFinding {
-        let finding = self.examine_sizes(step);
-        if step.stiff || finding != PulseFinding::Clear {
-            return finding;
-        }
         let (all, pulses) = (step.end.since(step.start), &step.solve.pulses);
-        let mut first = self.examine_changes(step, &pulses.rates, all);
-        if step.state.numeric_only {
-            first = first.earlier(self.examine_changes(step, &pulses.formula_rates, all));
+        let formulas = if step.state.numeric_only { Some((&pulses.formula_rates, all)) } else { None };
+        let own = [(&pulses.rates, all)].into_iter().chain(formulas).chain([(&pulses.values, 1.0)]);
+        let mut first = PulseFinding::Clear;
+        for (terms, scale) in own {
+            first = first.earlier(self.examine_terms(&Examination { step, terms, scale, reader: None }));
         }
-        first.earlier(self.examine_changes(step, &pulses.values, 1.0))
+        if first == PulseFinding::Clear && !step.stiff {
+            first = along(step, |path, _| self.examine_between(step, path));
+        }
+        let mut offset = step.world.tree.parameters(step.state.id).len();
+        for (n, id) in step.state.context.iter().enumerate() {
+            // The variables of children are gathered, and stand nowhere.
+            let reader = (n < step.state.context.context().len()).then_some(Reader { step, offset });
+            first = first.earlier(self.examine_formulas(step, *id, reader));
+            offset += step.world.tree.parameters(*id).len();
+        }
+        first
     }
 
-    /// As [`PulseDetector::examine`], by the sizes of rates, or of terms where the equations are stiff.
-    fn examine_sizes(&mut self, step: &ExaminedStep) -> PulseFinding {
-        if step.stiff {
-            let (all, pulses) = (step.end.since(step.start), &step.solve.pulses);
-            let mut first = self.examine_terms(step, &pulses.rates, all);
-            if step.state.numeric_only {
-                first = first.earlier(self.examine_terms(step, &pulses.formula_rates, all));
-            }
-            return first.earlier(self.examine_terms(step, &pulses.values, 1.0));
-        }
-        let all = step.end.since(step.start);
-        let rates = if step.state.numeric_only { &step.solve.rates } else { &step.solve.numeric_rates };
-        self.seen.clear();
-        self.seen.resize(rates.outputs(), 0.0);
-        // Most rates change so little over a step that those at its start tell enough.
-        if let Some(at_start) = step.at_start {
-            self.seen.iter_mut().zip(at_start).for_each(|(seen, rate)| *seen = rate.abs());
-            if self.is_plain(step, rates, all) {
-                return PulseFinding::Clear;
+    /// Compares the rates of the module's equations, and its values, with those of the dense output between the stages. The two formulas of a step, from
+    /// which its error is estimated, may agree by chance though a stage has met a pulse: on one of some hundred steps over one.
+    fn examine_between(&mut self, step: &ExaminedStep, path: &Path) -> PulseFinding {
+        let has_values = step.solve.pulses.values.terms.outputs() > 0;
+        // A value that a stage has met need not be that of the dense output.
+        let stages = if has_values { step.nodes } else { &[] };
+        for position in BETWEEN.iter().chain(stages) {
+            let rest = (path.start.after(position * path.h), (1.0 - position) * path.h);
+            let path = Path::of_equations(step.world, step.state, step.rule, rest, step.own);
+            path.everything_at(0.0, &mut self.values);
+            let is_far = BETWEEN.contains(position) && self.rates_are_far(step, &path);
+            if is_far || has_values && self.values_are_far(step, &path) {
+                return PulseFinding::Overlooked(0.0);
             }
         }
-        let values = &step.solve.algebraic.values;
-        let explicit = values.outputs() > 0 && step.solve.algebraic.explicit.iter().all(|e| *e);
-        let mut sampled = Vec::new();
-        if explicit {
-            self.sample(step, values, all);
-            sampled.clone_from(&self.seen);
-        }
-        self.sample(step, rates, all);
-        along(step, |path, part| {
-            let finding = self.compare(path, rates, all * part, part, step);
-            if !explicit || finding != PulseFinding::Clear {
-                return finding;
-            }
-            // Bounds of the explicit values are compared with the dense output of these values, which others read, and with the values at the stages: dense
-            // output has stages of its own, on which no error depends.
-            let rates = std::mem::take(&mut self.seen);
-            let of = step.solve.algebraic.of.iter().zip(&sampled);
-            let seen = |(p, at_stages): (&usize, &f64)| {
-                path.dense_bounds(*p).map_or(f64::INFINITY, |bounds| bounds.magnitude().min(*at_stages))
-            };
-            self.seen = of.map(seen).collect();
-            let finding = self.compare(path, values, 1.0, part, step);
-            self.seen = rates;
-            finding
+        PulseFinding::Clear
+    }
+
+    /// True if rates at the start of a path are not those of the dense output. The variables there are in `values`.
+    fn rates_are_far(&mut self, step: &ExaminedStep, path: &Path) -> bool {
+        let (solve, all) = (step.solve, step.end.since(step.start));
+        let rates = if step.state.numeric_only { &solve.rates } else { &solve.numeric_rates };
+        self.out.resize(rates.outputs(), 0.0);
+        rates.eval(&self.values, &mut self.scratch, &mut self.out);
+        self.out.iter().enumerate().any(|(number, rate)| {
+            let parameter = solve.of[if step.state.numeric_only { number } else { solve.numeric[number] }];
+            path.dense_component(parameter).is_some_and(|along| {
+                let Dual { value, rate: of_dense } = along.departure();
+                step.is_far(rate * all, of_dense / path.h * all, value)
+            })
         })
     }
 
-    /// True for a step of a module that is integrated alone whose rates are bounded over the whole of it by what has been seen.
-    fn is_plain(&mut self, step: &ExaminedStep, rates: &Program, all: f64) -> bool {
-        if step.solve.algebraic.values.outputs() > 0 {
-            return false;
-        }
-        let path = Path::of_equations(step.world, step.state, step.rule, (step.start, all), step.own);
-        self.bound(&path, rates, (0.0, 1.0));
-        self.bounds_out.iter().zip(&self.seen).all(|(bounds, seen)| bounds.magnitude() <= SURPRISE * seen)
+    /// True if values at the start of a path are not those of the dense output. The variables there are in `values`.
+    fn values_are_far(&mut self, step: &ExaminedStep, path: &Path) -> bool {
+        let terms = &step.solve.pulses.values;
+        self.values.resize(self.values.len() + terms.terms.outputs(), 0.0);
+        self.out.resize(terms.disturbed.outputs(), 0.0);
+        terms.disturbed.eval(&self.values, &mut self.scratch, &mut self.out);
+        terms.parameters.iter().zip(&self.out).enumerate().any(|(number, (parameter, value))| {
+            path.dense_component(*parameter).is_some_and(|along| {
+                let of_dense = along.value(0.0);
+                let expected = if number < terms.explicit { of_dense } else { 0.0 };
+                step.is_far(*value, expected, of_dense)
+            })
+        })
     }
 
-    /// Bounds terms of the module's equations and compares each with its values at the stages. One that lasts for the whole step contributes `scale`
-    /// times its size to the values.
-    fn examine_terms(&mut self, step: &ExaminedStep, terms: &Program, scale: f64) -> PulseFinding {
-        if terms.outputs() == 0 {
+    /// Examines the terms of the values of another module that follow formulas.
+    fn examine_formulas(
+        &mut self,
+        step: &ExaminedStep,
+        id: ModuleId,
+        reader: Option<Reader>,
+    ) -> PulseFinding {
+        let Some(state) = step.world.state(id) else { return PulseFinding::Clear };
+        let Some((rule, solve)) = state.rule.zip(state.solve) else { return PulseFinding::Clear };
+        let rule = &step.rules[rule];
+        let (solve, terms) = (&rule.solves[solve], &rule.solves[solve].pulses.values);
+        let follows =
+            |p: &usize| state.trajectories.get(*p).is_some_and(|law| matches!(law, Trajectory::Function(_)));
+        if terms.terms.outputs() == 0 || !terms.parameters.iter().any(follows) {
             return PulseFinding::Clear;
         }
-        self.sample(step, terms, step.end.since(step.start));
-        along(step, |path, part| self.compare(path, terms, scale * part, part, step))
+        let scale = step.end.since(step.start);
+        let other = ExaminedStep { state, rule, solve, own: None, ..*step };
+        self.examine_terms(&Examination { step: &other, terms, scale, reader })
     }
 
-    /// Compares bounds of terms with the range of their values at the ends of the step, and if need be at all stages.
-    fn examine_changes(&mut self, step: &ExaminedStep, terms: &Program, scale: f64) -> PulseFinding {
-        if terms.outputs() == 0 {
+    /// Bounds terms along a step and compares each with its values at the stages.
+    fn examine_terms(&mut self, all: &Examination) -> PulseFinding {
+        if all.terms.terms.outputs() == 0 {
             return PulseFinding::Clear;
         }
         self.ranges.clear();
-        self.ranges.resize(terms.outputs(), Interval::EMPTY);
-        let mut finding = PulseFinding::Clear;
-        for nodes in [&[0.0, 1.0][..], step.nodes] {
-            self.widen_ranges(step, terms, nodes);
-            finding = along(step, |path, part| self.compare_changes(path, terms, scale * part, part, step));
-            if finding == PulseFinding::Clear {
-                break;
-            }
-        }
-        finding
+        self.ranges.resize(all.terms.terms.outputs(), Interval::EMPTY);
+        self.sampled = Sampled::Nowhere;
+        along(all.step, |path, part| self.halve(all, path, part))
     }
 
-    /// Includes the values of a program at some positions of a step in its ranges.
-    fn widen_ranges(&mut self, step: &ExaminedStep, program: &Program, nodes: &[f64]) {
-        let all = step.end.since(step.start);
+    /// Includes the values of terms at the ends or the stages of a step in their ranges.
+    fn sample(&mut self, all: &Examination, up_to: Sampled) {
+        if self.sampled >= up_to {
+            return;
+        }
+        self.sampled = up_to;
+        let (step, program) = (all.step, &all.terms.terms);
+        let h = step.end.since(step.start);
         self.out.resize(program.outputs(), 0.0);
+        let nodes = if up_to == Sampled::Ends { &[0.0, 1.0][..] } else { step.nodes };
         for node in nodes {
-            let at = (step.start.after(node * all), 0.0);
+            let at = (step.start.after(node * h), 0.0);
             let path = Path::of_equations(step.world, step.state, step.rule, at, step.own);
             path.everything_at(0.0, &mut self.values);
             program.eval(&self.values, &mut self.scratch, &mut self.out);
@@ -230,82 +285,24 @@ impl PulseDetector {
         }
     }
 
-    /// Compares bounds of terms along a path with their ranges; as [`PulseDetector::compare`].
-    fn compare_changes(
-        &mut self,
-        path: &Path,
-        terms: &Program,
-        scale: f64,
-        part: f64,
-        step: &ExaminedStep,
-    ) -> PulseFinding {
-        self.halve(path, terms, part, true, |bounds, detector, length| {
-            bounds.iter().zip(&detector.ranges).any(|(bounds, range)| {
-                let excess = (bounds.hi - range.hi).max(range.lo - bounds.lo);
-                !(excess <= SURPRISING_CHANGE * (range.hi - range.lo)
-                    || excess * scale * length <= step.tolerance)
-            })
-        })
-    }
-
-    /// Evaluates a program at the stages of the method, and keeps the largest size of each output.
-    fn sample(&mut self, step: &ExaminedStep, program: &Program, all: f64) {
-        self.seen.clear();
-        self.seen.resize(program.outputs(), 0.0);
-        self.out.resize(program.outputs(), 0.0);
-        for node in step.nodes {
-            let at = (step.start.after(node * all), 0.0);
-            let path = Path::of_equations(step.world, step.state, step.rule, at, step.own);
-            path.everything_at(0.0, &mut self.values);
-            program.eval(&self.values, &mut self.scratch, &mut self.out);
-            for (seen, value) in self.seen.iter_mut().zip(&self.out) {
-                *seen = seen.max(value.abs());
-            }
-        }
-    }
-
-    /// Compares bounds of a program along a path, which is the part `part` of the step, with its values at the stages.
-    /// A rate that lasts for the whole path contributes `scale` times its size to the values.
-    fn compare(
-        &mut self,
-        path: &Path,
-        program: &Program,
-        scale: f64,
-        part: f64,
-        step: &ExaminedStep,
-    ) -> PulseFinding {
-        self.halve(path, program, part, step.stiff, |bounds, detector, length| {
-            bounds.iter().zip(&detector.seen).any(|(bounds, seen)| {
-                let size = bounds.magnitude();
-                !(size <= SURPRISE * seen || size * scale * length <= step.tolerance)
-            })
-        })
-    }
-
-    /// Bounds a program over a path, and over halves of pieces of it as long as the bounds are a surprise in a piece of some length.
-    fn halve(
-        &mut self,
-        path: &Path,
-        program: &Program,
-        part: f64,
-        tightens: bool,
-        is_surprise: impl Fn(&[Interval], &PulseDetector, f64) -> bool,
-    ) -> PulseFinding {
+    /// Bounds terms over a path, which is the part `part` of the step, and over halves of pieces of it as long as the bounds are a surprise.
+    fn halve(&mut self, all: &Examination, path: &Path, part: f64) -> PulseFinding {
         let mut stack: SmallVec<[(f64, f64); 16]> = SmallVec::new();
         stack.push((0.0, 1.0));
         let mut pieces = 0;
-        while let Some((lo, hi)) = stack.pop() {
+        while let Some(piece) = stack.pop() {
             pieces += 1;
-            self.bound(path, program, (lo, hi));
-            if !is_surprise(&self.bounds_out, self, hi - lo) {
+            self.bound(path, &all.terms.terms, piece);
+            if !self.is_surprised(all, path, part, piece) {
                 continue;
             }
-            if tightens && !path.world.stretch.is_finite() {
-                self.tighten(path, program, (lo, hi));
-                if !is_surprise(&self.bounds_out, self, hi - lo) {
+            if !path.world.stretch.is_finite() {
+                self.tighten(path, &all.terms.terms, piece);
+                if !self.is_surprised(all, path, part, piece) {
                     continue;
                 }
             }
+            let (lo, hi) = piece;
             let bounded = self.bounds_out.iter().all(|bounds| bounds.magnitude().is_finite());
             if (hi - lo) * part <= NARROW {
                 return if bounded { PulseFinding::Overlooked(lo) } else { PulseFinding::Unbounded(lo) };
@@ -317,6 +314,89 @@ impl PulseDetector {
             stack.extend([(middle, hi), (lo, middle)]);
         }
         PulseFinding::Clear
+    }
+
+    /// True if the bounds of some term over a piece of a path allow for a pulse that no stage has seen.
+    fn is_surprised(&mut self, all: &Examination, path: &Path, part: f64, (lo, hi): (f64, f64)) -> bool {
+        let (share, tolerance) = (part * (hi - lo), all.step.tolerance);
+        (0..self.bounds_out.len()).any(|term| {
+            let bounds = self.bounds_out[term];
+            let is_outer = term < all.terms.outer && all.reader.is_none();
+            if is_outer
+                && (bounds.hi - bounds.lo).max(0.0) * all.scale * share <= tolerance
+                && !all.step.stiff
+            {
+                return false;
+            }
+            if !is_outer && !bounds.magnitude().is_finite() {
+                // What is bounded as a whole may have terms that are not.
+                return false;
+            }
+            let mut excess = (0.0, 0.0);
+            for sampled in [Sampled::Ends, Sampled::Stages] {
+                self.sample(all, sampled);
+                let range = self.ranges[term];
+                let usual = if all.step.stiff { range.magnitude() } else { range.hi - range.lo };
+                excess = match all.step.stiff {
+                    true => (bounds.hi.max(0.0), (-bounds.lo).max(0.0)),
+                    false => (bounds.hi - range.hi, range.lo - bounds.lo),
+                };
+                if excess.0.max(excess.1) <= SURPRISE * usual {
+                    return false;
+                }
+            }
+            let effect = match is_outer {
+                true => all.scale * excess.0.max(excess.1),
+                false => {
+                    let middle = 0.5 * (lo + hi);
+                    [excess.0, -excess.1]
+                        .map(|by| self.effect(all, path, middle, term, by))
+                        .into_iter()
+                        .fold(0.0, f64::max)
+                }
+            };
+            !(effect * share <= tolerance)
+        })
+    }
+
+    /// The change of values over the whole step if a term were larger by `more` than it is at a position of a path.
+    fn effect(&mut self, all: &Examination, path: &Path, position: f64, term: usize, more: f64) -> f64 {
+        let (terms, program) = (all.terms, &all.terms.disturbed);
+        path.everything_at(position, &mut self.values);
+        let first = self.values.len();
+        self.values.resize(first + terms.terms.outputs(), 0.0);
+        self.out.resize(program.outputs(), 0.0);
+        self.changed.resize(program.outputs(), 0.0);
+        program.eval(&self.values, &mut self.scratch, &mut self.out);
+        self.values[first + term] = more;
+        program.eval(&self.values, &mut self.scratch, &mut self.changed);
+        let Some(Reader { step, offset }) = all.reader else {
+            return all.scale * largest_difference(&self.changed, &self.out);
+        };
+        let path = Path::of_equations(
+            step.world,
+            step.state,
+            step.rule,
+            (path.start.after(position * path.h), 0.0),
+            step.own,
+        );
+        path.everything_at(0.0, &mut self.values);
+        let changes: SmallVec<[(usize, f64); 4]> =
+            (terms.parameters.iter().zip(self.changed.iter().zip(&self.out)))
+                .map(|(parameter, (after, before))| (offset + parameter, after - before))
+                .collect();
+        let rates = if step.state.numeric_only { &step.solve.rates } else { &step.solve.numeric_rates };
+        let mut all_effects = 0.0f64;
+        for (program, scale) in [(rates, all.scale), (&step.solve.algebraic.values, 1.0)] {
+            self.out.resize(program.outputs(), 0.0);
+            self.changed.resize(program.outputs(), 0.0);
+            program.eval(&self.values, &mut self.scratch, &mut self.out);
+            changes.iter().for_each(|(variable, more)| self.values[*variable] += more);
+            program.eval(&self.values, &mut self.scratch, &mut self.changed);
+            changes.iter().for_each(|(variable, more)| self.values[*variable] -= more);
+            all_effects = all_effects.max(scale * largest_difference(&self.changed, &self.out));
+        }
+        all_effects
     }
 
     /// Bounds the outputs of a program over a piece of a path.
@@ -350,6 +430,12 @@ impl PulseDetector {
             }
         }
     }
+}
+
+/// The largest difference of two lists; infinite where one of them has no number.
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    differences.map(|d| if d.is_nan() { f64::INFINITY } else { d }).fold(0.0, f64::max)
 }
 
 /// The first finding along a step, which is gone through in pieces on which all dense output is that of one step each: `examine` gets a piece, and the part of the

@@ -70,6 +70,16 @@ struct Coincidence {
     group: SmallVec<[Change; 1]>,
 }
 
+/// Positions that are indistinguishable from that of a first crossing.
+struct Together {
+    /// The last one, given the resolution of time.
+    instant: f64,
+    /// The last one, given the error of integration.
+    uncertain: f64,
+    /// The atom that crosses first, if its values are integrated.
+    atom: Option<usize>,
+}
+
 /// A search in progress.
 struct Search<'s, 'p> {
     detector: &'s mut CrossingDetector,
@@ -234,11 +244,20 @@ impl Search<'_, '_> {
 
     /// The changes of sign that belong to the instant of the first crossing.
     fn coincidence(&mut self, first: Crossing) -> Coincidence {
-        let together = self.last_together(first.position);
+        let Together { instant, uncertain, atom: leader } = self.together(first.position);
+        let together: SmallVec<[f64; 4]> = (self.tracked.iter())
+            .map(|t| {
+                if leader.is_some_and(|first| self.share_uncertainty(first, t.atom)) {
+                    uncertain
+                } else {
+                    instant
+                }
+            })
+            .collect();
         let (mut at, mut after) = (Signs::from_slice(&self.now), Signs::from_slice(&self.now));
         let mut group: SmallVec<[Change; 1]> = SmallVec::new();
         let Search { detector, path, now, tracked, .. } = self;
-        for tracked in &*tracked {
+        for (tracked, together) in tracked.iter().zip(together) {
             let atom = tracked.atom;
             // The instant of a touch is known only to about the square root of the rounding: a difference that is zero
             // here touches here.
@@ -265,19 +284,31 @@ impl Search<'_, '_> {
         Coincidence { at, after, group }
     }
 
-    /// The last position that is indistinguishable from that of the first crossing, given the resolution of time and
-    /// the error of integration.
-    fn last_together(&mut self, first: f64) -> f64 {
+    /// The last positions that are indistinguishable from that of the first crossing.
+    fn together(&mut self, first: f64) -> Together {
         let instant = first + self.path.start.after(first * self.path.h).resolution() / self.path.h;
         let crosses_first = |t: &TrackedAtom| t.ahead.next.is_some_and(|c| c.position == first);
         let crossing = self.tracked.iter().filter(|t| t.ahead.next.is_some()).count();
         let first_is_exact = || self.tracked.iter().any(|t| t.is_exact() && crosses_first(t));
         if !self.is_integrated() || crossing <= 1 || first_is_exact() {
-            return instant;
+            return Together { instant, uncertain: instant, atom: None };
         }
         let atom = self.tracked.iter().find(|t| crosses_first(t)).map(|t| t.atom);
         let slack = atom.map_or(0.0, |atom| self.detector.slack(self.path, atom, first));
-        instant.max(first + slack)
+        Together { instant, uncertain: instant.max(first + slack), atom }
+    }
+
+    /// True if the errors of integration leave it open which of two atoms changes first, and a production depends on both. Levels of one value are
+    /// taken in their order, whatever its error is; and conditions inside equations change where they do.
+    fn share_uncertainty(&self, first: usize, other: usize) -> bool {
+        if !self.decides(first) || !self.decides(other) {
+            return false;
+        }
+        let moving = |atom: usize| -> SmallVec<[usize; 4]> {
+            self.path.rule.atom_reads[atom].iter().copied().filter(|v| self.path.moves(*v)).collect()
+        };
+        let (a, b) = (moving(first), moving(other));
+        a.len() != 1 || a != b
     }
 
     /// Looks ahead again for the atoms that have changed without consequence.

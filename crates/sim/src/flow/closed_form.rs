@@ -29,6 +29,9 @@ pub fn formulas(solve: &Solve, time: usize, scratch: &mut Scratch, trajectories:
             SolutionForm::Quadratic(program) => {
                 program.eval(&scratch.variables, &mut scratch.registers, &mut out[..3]);
                 let riccati = Riccati::new(scratch.variables[parameter], out[0], out[1], out[2]);
+                if riccati.loses_digits(scratch.variables[parameter], out[0], out[1], out[2]) {
+                    return false;
+                }
                 trajectories[parameter] = Trajectory::Riccati(riccati);
             }
             SolutionForm::Sum { .. } => sums_follow = true,

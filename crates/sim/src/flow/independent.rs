@@ -256,9 +256,9 @@ impl FlowStage<'_, '_> {
             }
             let (world, tolerance) = (&*self.world, self.setup.settings.tolerance);
             let (nodes, start, end, own) = (&*integrator.nodes(), from, dense.end, Some(dense));
-            let at_start = (nodes.first() == Some(&0.0)).then(|| integrator.rates_at_start());
             let examined = ExaminedStep {
                 world,
+                rules: &self.setup.model.rules,
                 state,
                 rule,
                 solve,
@@ -266,7 +266,6 @@ impl FlowStage<'_, '_> {
                 end,
                 nodes,
                 own,
-                at_start,
                 tolerance,
                 stiff,
             };

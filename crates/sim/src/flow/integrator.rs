@@ -79,11 +79,6 @@ impl Integrator {
         self.stepper.nodes()
     }
 
-    /// The rates at the start of the step just made.
-    pub fn rates_at_start(&self) -> &[f64] {
-        self.stepper.rates_at_start()
-    }
-
     /// True if the implicit method was taken for some step so far.
     pub fn is_implicit(&self) -> bool {
         self.stepper.has_been_implicit()

@@ -33,6 +33,8 @@ enum Case {
     Complex,
 }
 
+/// From a start so many times as large as the equilibrium that it falls to, and as 1, a displacement does not tell the value there.
+const FAR: f64 = 1e7;
 /// A rate of less than this part of that at the start has lost digits if it is computed from the coefficients.
 const NEARLY_STILL: f64 = 1e-2;
 
@@ -88,6 +90,24 @@ impl Riccati {
                 self.f * s / (self.w * c - 0.5 * self.d * s)
             }
         }
+    }
+
+    /// True if the solution of `x' = c + b x + a x²` falls from `x` to an equilibrium so much smaller that the displacement from `x` has lost the digits
+    /// of it.
+    pub fn loses_digits(&self, x: f64, c: f64, b: f64, a: f64) -> bool {
+        let equilibrium = match self.case {
+            _ if self.f == 0.0 || x.abs() < FAR => return false,
+            // A decay to 0 is computed directly.
+            Case::Exponential if self.d >= 0.0 || c == 0.0 => return false,
+            Case::Exponential => -c / b,
+            Case::Complex => return false,
+            Case::Real if self.pole().is_some() => return false,
+            // The rate falls where the solution rests. Of the two forms of that root, one does not cancel.
+            Case::Real if b > 0.0 => (-b - 2.0 * self.w) / (2.0 * a),
+            Case::Real if b < 2.0 * self.w => 2.0 * c / (2.0 * self.w - b),
+            Case::Real => 0.0,
+        };
+        equilibrium.abs() * FAR < x.abs()
     }
 
     /// The value at a time since the start, at which it was `x`, for `x' = b x`: not by its displacement.
@@ -225,6 +245,18 @@ mod tests {
         let tiny = Riccati::new(1e-300, 0.0, 1.0, -1.0);
         assert!(close(tiny.reach(0.5, || 0.25).expect("reached"), 690.775_527_898_213_7, 1e-15));
         assert!(close(tiny.value(690.775_527_898_213_7), 0.5, 1e-12));
+    }
+
+    #[test]
+    fn what_falls_from_far_above_is_told() {
+        let loses = |x: f64, c: f64, b: f64, a: f64| Riccati::new(x, c, b, a).loses_digits(x, c, b, a);
+        assert!(
+            loses(1e18, 2.0, 0.0, -1.0) && loses(1e18, 0.0, 1.0, -1.0 / 3.0) && loses(1e18, 2.0, -1.0, 0.0)
+        );
+        assert!(loses(-1e18, -2.0, 0.0, 1.0) && loses(1e9, 0.0, 0.0, -1.0));
+        // Towards nothing smaller, or nowhere.
+        assert!(!loses(1e18, 1e36, 0.0, -1.0) && !loses(1e18, 0.0, -1.0, 0.0) && !loses(3.0, 2.0, 0.0, -1.0));
+        assert!(!loses(1e18, 0.0, 1.0, 0.0) && !loses(1e18, 1.0, 0.0, 1.0));
     }
 
     #[test]

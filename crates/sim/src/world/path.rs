@@ -277,6 +277,20 @@ impl<'p> Path<'p> {
         })
     }
 
+    /// False for a variable that is a parameter at rest.
+    pub fn moves(&self, variable: usize) -> bool {
+        let mut parameter = variable;
+        for id in std::iter::once(&self.state.id).chain(self.state.context.context()) {
+            let count = self.world.tree.parameters(*id).len();
+            if parameter < count {
+                let law = self.world.state(*id).and_then(|s| s.trajectories.get(parameter));
+                return law.is_some_and(|law| !matches!(law, Trajectory::Rest));
+            }
+            parameter -= count;
+        }
+        true
+    }
+
     /// The estimated error of integrated values along the path, relative to their size; 0 if there are none.
     pub fn error(&self) -> f64 {
         let solution = self.world.coupled.as_ref().map_or(0.0, |solution| solution.error);

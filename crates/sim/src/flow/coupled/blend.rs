@@ -25,6 +25,11 @@ const KINK: f64 = 10.0;
 /// What is found there may be rounding, up to so many times that of the values.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
+/// A stretch of at most so many times the resolution of time is not halved any more.
+const NARROW: f64 = 16.0;
+/// What the interpolant may miss in so narrow a stretch, in place of the tolerance: a root that begins or ends changes that fast. More is a jump.
+const STEEP: f64 = 1e-3;
+
 /// The points, and for each coefficient in Bernstein form the weights of the values there.
 static INTERPOLATION: LazyLock<([f64; POINTS], [[f64; POINTS]; POINTS])> = LazyLock::new(|| {
     let angle = |i: usize| std::f64::consts::PI * i as f64 / MAX_DEGREE as f64;
@@ -82,6 +87,8 @@ impl Equations<'_> {
             for (c, v) in all.iter_mut().zip(&values) {
                 (c[0], c[MAX_DEGREE]) = (v[0], v[MAX_DEGREE]);
             }
+            let narrow = (hi - lo) * step.h <= NARROW * step.end.resolution();
+            let allowed = if narrow { STEEP } else { tolerance };
             let mut fits = true;
             let mut misfits: Vec<(u32, f64)> = unknowns.iter().map(|c| (*c as u32, 0.0)).collect();
             let mut state = last.clone();
@@ -91,7 +98,7 @@ impl Equations<'_> {
                     all.iter().zip(&values).zip(&unknowns).zip(&mut misfits)
                 {
                     let (off, there) = ((Dense::at(c, s) - state[place]).abs(), state[place].abs());
-                    fits &= off <= tolerance * there.max(1.0);
+                    fits &= off <= allowed * there.max(1.0);
                     if off > ROUNDING * values.iter().fold(0.0, |size: f64, v| size.max(v.abs())) {
                         misfit.1 = misfit.1.max(KINK * off);
                     }

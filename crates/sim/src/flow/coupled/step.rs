@@ -371,6 +371,5 @@ fn examined_step<'p>(
     let state = world.state(id)?;
     let rule = &rules[state.rule?];
     let (solve, end) = (&rule.solves[state.solve?], world.coupled.as_ref()?.end);
-    let (own, at_start) = (None, None);
-    Some(ExaminedStep { world, state, rule, solve, start, end, nodes, own, at_start, tolerance, stiff })
+    Some(ExaminedStep { world, rules, state, rule, solve, start, end, nodes, own: None, tolerance, stiff })
 }
