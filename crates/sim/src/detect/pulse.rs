@@ -303,7 +303,8 @@ impl PulseDetector {
                 }
             }
             let (lo, hi) = piece;
-            let bounded = self.bounds_out.iter().all(|bounds| bounds.magnitude().is_finite());
+            let bounded =
+                self.bounds_out.iter().take(all.terms.outer).all(|bounds| bounds.magnitude().is_finite());
             if (hi - lo) * part <= NARROW {
                 return if bounded { PulseFinding::Overlooked(lo) } else { PulseFinding::Unbounded(lo) };
             }
