@@ -47,8 +47,8 @@ use smallvec::SmallVec;
 pub struct Reintegration {
     integrator: Integrator,
     control: Control,
-    /// The number of rings with which the next one begins.
-    rings: usize,
+    /// The numbers of rings, the seeds among them, that the last two have changed.
+    changed: [usize; 2],
     /// The same in stiff equations, by cause.
     reaches: [StiffReach; 2],
     /// The largest effect of one component on the rate of another in the region, in stiff equations.
@@ -90,7 +90,7 @@ impl Default for Reintegration {
         Reintegration {
             integrator,
             control,
-            rings: 3,
+            changed: [3; 2],
             reaches: Default::default(),
             strength: 0.0,
             numbers,
@@ -117,22 +117,23 @@ impl Reintegration {
 
     /// The number of rings with which a re-integration over so much time begins.
     fn rings_within(&self, room: f64, stiff: Option<Cause>) -> usize {
-        stiff.map_or(self.rings, |cause| {
+        // Around the seeds there is one ring more than changes.
+        stiff.map_or(self.changed[0].max(self.changed[1]).clamp(1, MAX_RINGS), |cause| {
             let rings = (self.reaches[cause as usize].spread * room.sqrt()).ceil();
             (rings as usize).clamp(FEW_RINGS, MAX_STIFF_RINGS)
         })
     }
 
-    /// Remembers how many rings were needed over so much time.
-    fn learn(&mut self, rings: usize, room: f64, stiff: Option<Cause>) {
+    /// Remembers that so many rings changed over so much time, the seeds among them.
+    fn learn(&mut self, changed: usize, room: f64, stiff: Option<Cause>) {
         match stiff {
             // An attempt with too few rings costs more than a ring too many. A very short time says little.
             Some(cause) => {
                 let spread = &mut self.reaches[cause as usize].spread;
-                let found = SPARE_RINGS * rings as f64 / room.sqrt();
+                let found = SPARE_RINGS * (changed + 1) as f64 / room.sqrt();
                 *spread = if *spread > 0.0 { found.min(2.0 * *spread) } else { found };
             }
-            None => self.rings = rings.clamp(1, MAX_RINGS),
+            None => self.changed = [changed, self.changed[0]],
         }
     }
 
@@ -239,12 +240,11 @@ impl FlowStage<'_, '_> {
             let reach = if sliced { 0 } else { self.reach(&trial, room) };
             let closed = region.rings.len() <= rings;
             if reach < region.rings.len() || closed {
-                // The next re-integration begins with one ring beyond the last that changed.
-                self.flows.coupled.reintegration.learn(reach + 1, room, stiff);
+                self.flows.coupled.reintegration.learn(reach, room, stiff);
                 self.adopt(&mut trial);
                 break true;
             }
-            rings += if stiff.is_some() { rings / 2 + 1 } else { rings };
+            rings += rings / 2 + 1;
             if rings > if stiff.is_some() { MAX_STIFF_RINGS } else { MAX_RINGS } {
                 break false;
             }
@@ -353,11 +353,9 @@ impl FlowStage<'_, '_> {
         if is_large(self.world) {
             solution.prefetch(components);
         }
-        let along: SmallVec<[_; 32]> =
-            components.iter().map(|c| solution.stretch(*c as usize, now)).collect();
-        y.extend(along.iter().zip(&owners).map(|(along, &(id, parameter))| match along {
-            Some((dense, component)) => dense.value(*component, dense.position(now)),
-            None => self.world.tree.parameters(id)[parameter],
+        y.extend(components.iter().zip(&owners).map(|(component, &(id, parameter))| {
+            let value = solution.value(*component as usize, now);
+            value.unwrap_or_else(|| self.world.tree.parameters(id)[parameter])
         }));
         for (number, &component) in components.iter().enumerate() {
             if numbers.len() <= component as usize {
