@@ -59,6 +59,11 @@ impl Context {
         self.modules.truncate(context);
     }
 
+    /// Puts a module in the place of another.
+    pub fn exchange(&mut self, old: ModuleId, new: ModuleId) {
+        self.modules.iter_mut().filter(|id| **id == old).for_each(|id| *id = new);
+    }
+
     /// Turns round the first modules of the context.
     pub fn reverse(&mut self, first: usize) {
         self.modules[..first].reverse();
