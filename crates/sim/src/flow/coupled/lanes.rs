@@ -193,11 +193,7 @@ impl LaneBatches {
     /// The column of a variable with these sources, in a system of so many components. Most variables are components or
     /// inputs.
     #[inline]
-    pub fn column(
-        &mut self,
-        components: usize,
-        sources: impl Iterator<Item = VariableSource>,
-    ) -> LaneColumn {
+    pub fn column(&mut self, components: usize, sources: impl Iterator<Item = VariableSource>) -> LaneColumn {
         let place = self.places.len();
         let mut inputs = false;
         // All sources, once one of them is neither.

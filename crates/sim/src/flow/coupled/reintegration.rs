@@ -10,7 +10,7 @@
 //! Let ε be the error that a step may have ([`INNER_TOLERANCE`] times the tolerance). A re-integration has the step
 //! control of any other step. It neglects the change of the modules outside. These read the region only through its
 //! outermost ring, and the change of that ring, old trajectory against new, is measured along the whole rest of the
-//! step: if it exceeds ε anywhere, the re-integration is repeated with twice as many rings. So the neglected change
+//! step: if it exceeds ε anywhere, the re-integration is repeated with half as many rings more. So the neglected change
 //! enters the rates outside as a disturbance of at most ε times the Lipschitz constant L of the coupling, and over the
 //! rest of a step of length h it changes their values by at most ε (exp(L h) - 1). Explicit methods keep L h to a few
 //! units (beyond that their stability ends, the equations count as stiff, and every event ends the step): the neglected
@@ -33,7 +33,7 @@ use crate::flow::coupled::system::{Membership, System, integrated};
 use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator, StepRequest};
 use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
-use crate::world::coupled_solution::CoupledSolution;
+use crate::world::coupled_solution::{CoupledSolution, value_of};
 use crate::world::neighbours::reads;
 use crate::world::prefetch::{fetch, is_large};
 use crate::world::state::{Control, State};
@@ -433,12 +433,13 @@ impl FlowStage<'_, '_> {
         };
         let changes = |number: usize, component: u32| {
             trial.stretches.iter().any(|dense| {
-                [0.5, 1.0].into_iter().any(|position| {
-                    let at = if position == 1.0 { dense.end } else { dense.start.after(position * dense.h) };
-                    let new = dense.value(number, position);
-                    let old = solution.value(component as usize, at);
-                    old.is_none_or(|old| (new - old).abs() > tolerance * new.abs().max(old.abs()))
-                })
+                [(1.0, dense.end), (0.5, dense.start.after(0.5 * dense.h))].into_iter().any(
+                    |(position, at)| {
+                        let new = value_of(dense, number, position);
+                        let old = solution.value(component as usize, at);
+                        old.is_none_or(|old| (new - old).abs() > tolerance * new.abs().max(old.abs()))
+                    },
+                )
             })
         };
         let mut components = trial.components.iter().enumerate();
