@@ -135,7 +135,16 @@ impl EventStage<'_, '_> {
         context.clone_from(&state.context);
         context.exchange(dead, heir);
         self.neighbours.note(&self.world.tree, id, heir);
+        debug_assert!(self.is_matched(id, rule, context), "it matches another way");
         Some(rule)
+    }
+
+    /// True if a rule is the first one of a module that matches, in this context.
+    fn is_matched(&mut self, id: ModuleId, rule: usize, context: &Context) -> bool {
+        let (model, mut found) = (self.setup.model, Context::default());
+        let mut rules = model.kinds.get(self.world.tree.kind(id)).rules.iter().copied();
+        rules.find(|&rule| self.context(id, &model.rules[rule], false, &mut found)) == Some(rule)
+            && found == *context
     }
 
     /// Gives a module that goes on as it was the neighbours that have come in the place of others. It is integrated anew,
