@@ -3,8 +3,8 @@
 //! Each event integrates its region again up to the end of the common step, with one short stretch of polynomials for
 //! every event that its neighbours have had since the step began. So the work of an event grows with the length of the
 //! step, and the work of the step itself is shared by the events within it. Both are least where a module has about one
-//! event in a step: half as long, steps take a tenth longer; twice as long, regions have a ring more, stretches take twice
-//! the memory, and what regions neglect adds up to thirty times the error.
+//! event in a step: half as long, they take a tenth longer; twice as long, regions have a ring more and stretches take twice
+//! the memory.
 //!
 //! In stiff equations an event reaches so many modules within one life that regions would be all there is. There the
 //! length is found by what it costs: a step as long as its events take as much work as the step.
