@@ -22,6 +22,8 @@ pub struct Setup<'m> {
     pub looks_around: bool,
     /// By kind: some of its rules have a context.
     pub kinds_with_context: Vec<bool>,
+    /// By rule: some successor of it reads parameters of the context.
+    pub successors_read_context: Vec<bool>,
     /// Neighbours are remembered.
     pub hands_on: bool,
     /// Some rule has an aggregate.
@@ -49,6 +51,10 @@ impl<'m> Setup<'m> {
         let gathers = model.rules.iter().any(|rule| !rule.aggregates.is_empty());
         let solves = || model.rules.iter().flat_map(|rule| &rule.solves);
         let is_algebraic = solves().any(|solve| !solve.algebraic.is_empty());
+        let successors_read_context = model.rules.iter().map(|rule| {
+            let context = rule.parameters.len()..rule.variables - 2;
+            rule.produces.iter().flat_map(|produce| produce.outcome.reads()).any(|v| context.contains(&v))
+        });
         let is_discrete = model.rules.iter().any(|rule| rule.discrete);
         Setup {
             model,
@@ -60,6 +66,7 @@ impl<'m> Setup<'m> {
             cuts: model.kinds.find(CUT, 0),
             looks_around,
             kinds_with_context,
+            successors_read_context: successors_read_context.collect(),
             hands_on,
             gathers,
             plain: !hands_on && !gathers && !is_algebraic && !is_discrete && !settings.transitions,

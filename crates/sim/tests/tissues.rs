@@ -56,3 +56,22 @@ fn large_tissues_have_the_events_that_global_steps_find() {
     let error = difference(&auto.0, &global.0);
     assert!(error <= 1e-3, "{error:e}");
 }
+
+/// Modules that are replaced by one of their kind each, in contexts of one and two modules, some of which do not match: contexts
+/// are taken over by heirs, which debug builds match again.
+#[test]
+fn heirs_take_the_places_of_their_predecessors_in_contexts() {
+    let text = "initial string: W(0) A(0.13, 1) A(0.5, 2) B(0.31) A(0.72, 3) B(0.2) A(0.94, 4) W(0)\n\
+        A(u, p) B(z) < A(x, c):\n  if x < 1 solve dx/dt = 1, dc/dt = p*z - c\n  if x = 1 produce A(0, 0.5*c)\n\
+        A(x, c) > A(y, d):\n  if x < 1 solve dx/dt = 1, dc/dt = d - c\n  if x = 1 produce A(0, c + 1)\n\
+        A(x, c):\n  if x < 1 solve dx/dt = 1, dc/dt = 1 - c\n  if x = 1 produce A(0, 2*c)\n\
+        A(x, c) < B(z):\n  if z < 1 solve dz/dt = 0.4 + 0.01*c\n  if z = 1 produce B(0)\n";
+    let settings = Settings { tolerance: 1e-6, ..Settings::default() };
+    let auto = state(text, settings, 9.7);
+    let global = Settings { scheduler: Scheduler::Global, tolerance: 1e-9, ..settings };
+    let exact = state(text, global, 9.7);
+    assert!(auto.1 > 40, "{} events", auto.1);
+    assert_eq!(auto.1, exact.1);
+    let error = difference(&auto.0, &exact.0);
+    assert!(error <= 1e-5, "{error:e}");
+}

@@ -169,7 +169,11 @@ impl EventStage<'_, '_> {
             let rule = &model.rules[fire.rule];
             let clause = &rule.produces[fire.produce];
             let around = context_of(model, self.world, &self.events.steps.contexts, fire, &mut contexts);
-            self.world.variables(rule, fire.id, around, self.instant.at, &mut self.scratch.variables);
+            let (now, variables) = (self.instant.at, &mut self.scratch.variables);
+            match self.setup.successors_read_context[fire.rule] || self.log.records() {
+                true => self.world.variables(rule, fire.id, around, now, variables),
+                false => self.world.variables_read((rule, &[]), fire.id, around, now, variables),
+            }
             let lineage = self.world.tree.lineage(fire.id);
             let residual = if self.log.records() { self.residual(fire) } else { 0.0 };
             let made = match clause.is_fault {
@@ -211,6 +215,12 @@ impl EventStage<'_, '_> {
             let known = made.len();
             self.world.tree.replace(fire.id, kinds, arguments, now, family, &mut made);
             self.note_successor(fire.id, kinds, &made[known..]);
+            self.events.heir = match made[..] {
+                [heir] if kinds == [kind] && firing.len() == 1 && self.events.to_look.is_empty() => {
+                    Some((fire.id, heir))
+                }
+                _ => None,
+            };
             self.hand_on(fire.id, kind, kinds, &made[known..]);
             self.events.fresh = made;
             first = end;

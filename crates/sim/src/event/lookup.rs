@@ -66,17 +66,19 @@ impl EventStage<'_, '_> {
         }
         clear(&mut fresh);
         self.events.fresh = fresh;
+        let mut heir = self.events.heir.take();
         if std::mem::take(&mut self.events.lost) {
+            heir = None;
             self.neighbours.forget();
             self.events.to_look = self.contextual();
         }
         if !self.events.to_look.is_empty() {
-            self.look_around();
+            self.look_around(heir);
         }
     }
 
-    /// Looks up the modules whose neighbours have changed.
-    fn look_around(&mut self) {
+    /// Looks up the modules whose neighbours have changed; see [`Events::heir`](super::Events).
+    fn look_around(&mut self, heir: Option<(ModuleId, ModuleId)>) {
         let model = self.setup.model;
         let mut to_look = std::mem::take(&mut self.events.to_look);
         let mut context = Context::default();
@@ -90,8 +92,10 @@ impl EventStage<'_, '_> {
                 continue;
             }
             let rules = &model.kinds.get(self.world.tree.kind(id)).rules;
-            let applies =
-                rules.iter().copied().find(|&rule| self.context(id, &model.rules[rule], true, &mut context));
+            let applies = self.context_with_heir(id, heir, &mut context).or_else(|| {
+                let mut rules = rules.iter().copied();
+                rules.find(|&rule| self.context(id, &model.rules[rule], true, &mut context))
+            });
             let state = self.world.state(id);
             let Some(rule) = applies else {
                 if state.is_none_or(|s| s.rule.is_some()) {
@@ -116,6 +120,31 @@ impl EventStage<'_, '_> {
         self.events
             .opened
             .retain(|id| world.state(*id).is_some_and(|s| s.rule.is_some()) || world.is_lazy(*id));
+    }
+
+    /// The rule of a module that looks at one whose heir is of the same kind, and nothing else has changed: all that matched
+    /// then matches now. None for all others.
+    fn context_with_heir(
+        &mut self,
+        id: ModuleId,
+        heir: Option<(ModuleId, ModuleId)>,
+        context: &mut Context,
+    ) -> Option<usize> {
+        let ((dead, heir), state) = (heir.filter(|(_, heir)| *heir != id)?, self.world.state(id)?);
+        let rule = state.rule?;
+        context.clone_from(&state.context);
+        context.exchange(dead, heir);
+        self.neighbours.note(&self.world.tree, id, heir);
+        debug_assert!(self.is_matched(id, rule, context), "it matches another way");
+        Some(rule)
+    }
+
+    /// True if a rule is the first one of a module that matches, in this context.
+    fn is_matched(&mut self, id: ModuleId, rule: usize, context: &Context) -> bool {
+        let (model, mut found) = (self.setup.model, Context::default());
+        let mut rules = model.kinds.get(self.world.tree.kind(id)).rules.iter().copied();
+        rules.find(|&rule| self.context(id, &model.rules[rule], false, &mut found)) == Some(rule)
+            && found == *context
     }
 
     /// Gives a module that goes on as it was the neighbours that have come in the place of others. It is integrated anew,

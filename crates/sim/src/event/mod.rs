@@ -71,6 +71,9 @@ pub struct Events {
     to_look: Vec<ModuleId>,
     /// The remembered neighbours may be wrong.
     lost: bool,
+    /// The one module that was replaced since contexts were matched, and the one of the same kind in its place; None if
+    /// that is not all that has changed.
+    heir: Option<(ModuleId, ModuleId)>,
     /// Modules that rest on a boundary and have a context: their neighbours may move it.
     resting: Vec<ModuleId>,
     /// Discrete rules.

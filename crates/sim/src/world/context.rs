@@ -10,7 +10,7 @@ use dlsys_tree::ModuleId;
 
 /// The modules that a rule looks at: those of its context in the order of its variables, then, for each of its
 /// aggregates, those attached to it that match.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Context {
     modules: SmallVec<[ModuleId; 2]>,
     /// Those behind the context; few rules have aggregates.
@@ -24,6 +24,13 @@ struct Attached {
     context: u32,
     /// Where the children of each aggregate end.
     ends: SmallVec<[u32; 2]>,
+}
+
+impl Clone for Context {
+    fn clone(&self) -> Context {
+        // A copy of the memory: element by element takes several times as long, and an event copies five.
+        Context { modules: SmallVec::from_slice(&self.modules), attached: self.attached.clone() }
+    }
 }
 
 impl Deref for Context {
@@ -57,6 +64,11 @@ impl Context {
     /// Takes back all modules of the context but so many.
     pub fn truncate(&mut self, context: usize) {
         self.modules.truncate(context);
+    }
+
+    /// Puts a module in the place of another.
+    pub fn exchange(&mut self, old: ModuleId, new: ModuleId) {
+        self.modules.iter_mut().filter(|id| **id == old).for_each(|id| *id = new);
     }
 
     /// Turns round the first modules of the context.

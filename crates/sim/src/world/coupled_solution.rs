@@ -85,7 +85,7 @@ impl CoupledSolution {
     /// A component at an instant; None for one that has not been integrated yet.
     pub fn value(&self, component: usize, at: SimTime) -> Option<f64> {
         let (dense, component) = self.stretch(component, at)?;
-        Some(dense.value(component, dense.position(at)))
+        Some(value_of(dense, component, dense.position(at)))
     }
 
     /// Prefetches where these components are found, then how they move there: each of many would wait for memory three times.
@@ -145,6 +145,15 @@ impl CoupledSolution {
         }
         self.error = stretches.iter().map(|dense| dense.error).fold(self.error, f64::max);
         self.stretches.append(stretches);
+    }
+}
+
+/// A component at a position. What is looked for most is the end, and that is a coefficient.
+#[inline]
+pub fn value_of(dense: &Dense, component: usize, position: f64) -> f64 {
+    match dense.of(component) {
+        [.., last] if position == 1.0 => *last,
+        _ => dense.value(component, position),
     }
 }
 

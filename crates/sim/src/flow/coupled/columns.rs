@@ -7,7 +7,6 @@
 
 use crate::flow::coupled::equations::Equations;
 use crate::flow::coupled::lanes::{LaneColumn, ProgramKey};
-use crate::flow::coupled::rows::VariableSource;
 use crate::flow::coupled::system::{Membership, REGION, System};
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::CoupledSolution;
@@ -129,8 +128,8 @@ impl System {
             } else {
                 let mut reads = clause.stepping.reads(key.numeric_only).iter();
                 let read = reads.find(|read| read.variable == variable).expect("all that steps read");
-                let mut sources: SmallVec<[VariableSource; LANES]> = SmallVec::new();
-                for (state, _) in rows {
+                let System { table, lanes, .. } = &mut *self;
+                let sources = rows.iter().map(|(state, _)| {
                     let (module, moves) = match read.neighbour {
                         None => (state.id, Some(*state)),
                         Some(n) => {
@@ -139,9 +138,9 @@ impl System {
                         }
                     };
                     let x = || world.tree.parameters(module)[read.parameter];
-                    sources.push(self.table.source(moves, read.parameter, x, unknown));
-                }
-                self.lanes.column(components, &sources)
+                    table.source(moves, read.parameter, x, unknown)
+                });
+                lanes.column(components, sources)
             };
             self.lanes.push_column(variable, column);
         }

@@ -141,8 +141,7 @@ impl LaneBatches {
                 self.numbers(all.iter().map(|row| table.switches_of(row)[switch]))
             } else {
                 let read = all.iter().map(|row| table.sources[row.first_source + variable]);
-                let read: SmallVec<[VariableSource; LANES]> = read.collect();
-                self.column(table.places.len(), &read)
+                self.column(table.places.len(), read)
             };
             self.push_column(variable, column);
         }
@@ -193,21 +192,30 @@ impl LaneBatches {
 
     /// The column of a variable with these sources, in a system of so many components. Most variables are components or
     /// inputs.
-    pub fn column(&mut self, components: usize, sources: &[VariableSource]) -> LaneColumn {
+    #[inline]
+    pub fn column(&mut self, components: usize, sources: impl Iterator<Item = VariableSource>) -> LaneColumn {
         let place = self.places.len();
         let mut inputs = false;
+        // All sources, once one of them is neither.
+        let mut mixed: SmallVec<[VariableSource; LANES]> = SmallVec::new();
         for source in sources {
-            match *source {
-                VariableSource::State(component) => self.places.push(component),
-                VariableSource::Input(input) => {
+            match source {
+                VariableSource::State(component) if mixed.is_empty() => self.places.push(component),
+                VariableSource::Input(input) if mixed.is_empty() => {
                     inputs = true;
                     self.places.push(components as u32 + input);
                 }
-                _ => {
-                    self.places.truncate(place);
-                    return self.other_column(components, sources);
+                other => {
+                    mixed.extend(self.places.drain(place..).map(|place| match place {
+                        place if (place as usize) < components => VariableSource::State(place),
+                        place => VariableSource::Input(place - components as u32),
+                    }));
+                    mixed.push(other);
                 }
             }
+        }
+        if !mixed.is_empty() {
+            return self.other_column(components, &mixed);
         }
         if inputs { LaneColumn::Known(place) } else { LaneColumn::State(self.run(place)) }
     }
@@ -281,7 +289,8 @@ impl LaneBatches {
     /// Fills a register with one variable of some rows.
     fn gather(&self, table: &EquationTable, column: LaneColumn, point: &EvaluationPoint, to: &mut [f64]) {
         let pick = |from: &[f64], first: usize, to: &mut [f64]| {
-            for (lane, place) in to.iter_mut().zip(&self.places[first..]) {
+            let places = &self.places[first..first + to.len()];
+            for (lane, place) in to.iter_mut().zip(places) {
                 *lane = from[*place as usize];
             }
         };

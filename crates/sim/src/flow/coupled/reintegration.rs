@@ -10,7 +10,7 @@
 //! Let ε be the error that a step may have ([`INNER_TOLERANCE`] times the tolerance). A re-integration has the step
 //! control of any other step. It neglects the change of the modules outside. These read the region only through its
 //! outermost ring, and the change of that ring, old trajectory against new, is measured along the whole rest of the
-//! step: if it exceeds ε anywhere, the re-integration is repeated with twice as many rings. So the neglected change
+//! step: if it exceeds ε anywhere, the re-integration is repeated with half as many rings more. So the neglected change
 //! enters the rates outside as a disturbance of at most ε times the Lipschitz constant L of the coupling, and over the
 //! rest of a step of length h it changes their values by at most ε (exp(L h) - 1). Explicit methods keep L h to a few
 //! units (beyond that their stability ends, the equations count as stiff, and every event ends the step): the neglected
@@ -33,7 +33,7 @@ use crate::flow::coupled::system::{Membership, System, integrated};
 use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator, StepRequest};
 use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
-use crate::world::coupled_solution::CoupledSolution;
+use crate::world::coupled_solution::{CoupledSolution, value_of};
 use crate::world::neighbours::reads;
 use crate::world::prefetch::{fetch, is_large};
 use crate::world::state::{Control, State};
@@ -47,8 +47,8 @@ use smallvec::SmallVec;
 pub struct Reintegration {
     integrator: Integrator,
     control: Control,
-    /// The number of rings with which the next one begins.
-    rings: usize,
+    /// The numbers of rings, the seeds among them, that the last two have changed.
+    changed: [usize; 2],
     /// The same in stiff equations, by cause.
     reaches: [StiffReach; 2],
     /// The largest effect of one component on the rate of another in the region, in stiff equations.
@@ -90,7 +90,7 @@ impl Default for Reintegration {
         Reintegration {
             integrator,
             control,
-            rings: 3,
+            changed: [3; 2],
             reaches: Default::default(),
             strength: 0.0,
             numbers,
@@ -117,22 +117,23 @@ impl Reintegration {
 
     /// The number of rings with which a re-integration over so much time begins.
     fn rings_within(&self, room: f64, stiff: Option<Cause>) -> usize {
-        stiff.map_or(self.rings, |cause| {
+        // Around the seeds there is one ring more than changes.
+        stiff.map_or(self.changed[0].max(self.changed[1]).clamp(1, MAX_RINGS), |cause| {
             let rings = (self.reaches[cause as usize].spread * room.sqrt()).ceil();
             (rings as usize).clamp(FEW_RINGS, MAX_STIFF_RINGS)
         })
     }
 
-    /// Remembers how many rings were needed over so much time.
-    fn learn(&mut self, rings: usize, room: f64, stiff: Option<Cause>) {
+    /// Remembers that so many rings changed over so much time, the seeds among them.
+    fn learn(&mut self, changed: usize, room: f64, stiff: Option<Cause>) {
         match stiff {
             // An attempt with too few rings costs more than a ring too many. A very short time says little.
             Some(cause) => {
                 let spread = &mut self.reaches[cause as usize].spread;
-                let found = SPARE_RINGS * rings as f64 / room.sqrt();
+                let found = SPARE_RINGS * (changed + 1) as f64 / room.sqrt();
                 *spread = if *spread > 0.0 { found.min(2.0 * *spread) } else { found };
             }
-            None => self.rings = rings.clamp(1, MAX_RINGS),
+            None => self.changed = [changed, self.changed[0]],
         }
     }
 
@@ -239,12 +240,11 @@ impl FlowStage<'_, '_> {
             let reach = if sliced { 0 } else { self.reach(&trial, room) };
             let closed = region.rings.len() <= rings;
             if reach < region.rings.len() || closed {
-                // The next re-integration begins with one ring beyond the last that changed.
-                self.flows.coupled.reintegration.learn(reach + 1, room, stiff);
+                self.flows.coupled.reintegration.learn(reach, room, stiff);
                 self.adopt(&mut trial);
                 break true;
             }
-            rings += if stiff.is_some() { rings / 2 + 1 } else { rings };
+            rings += rings / 2 + 1;
             if rings > if stiff.is_some() { MAX_STIFF_RINGS } else { MAX_RINGS } {
                 break false;
             }
@@ -353,11 +353,9 @@ impl FlowStage<'_, '_> {
         if is_large(self.world) {
             solution.prefetch(components);
         }
-        let along: SmallVec<[_; 32]> =
-            components.iter().map(|c| solution.stretch(*c as usize, now)).collect();
-        y.extend(along.iter().zip(&owners).map(|(along, &(id, parameter))| match along {
-            Some((dense, component)) => dense.value(*component, dense.position(now)),
-            None => self.world.tree.parameters(id)[parameter],
+        y.extend(components.iter().zip(&owners).map(|(component, &(id, parameter))| {
+            let value = solution.value(*component as usize, now);
+            value.unwrap_or_else(|| self.world.tree.parameters(id)[parameter])
         }));
         for (number, &component) in components.iter().enumerate() {
             if numbers.len() <= component as usize {
@@ -435,12 +433,13 @@ impl FlowStage<'_, '_> {
         };
         let changes = |number: usize, component: u32| {
             trial.stretches.iter().any(|dense| {
-                [0.5, 1.0].into_iter().any(|position| {
-                    let at = if position == 1.0 { dense.end } else { dense.start.after(position * dense.h) };
-                    let new = dense.value(number, position);
-                    let old = solution.value(component as usize, at);
-                    old.is_none_or(|old| (new - old).abs() > tolerance * new.abs().max(old.abs()))
-                })
+                [(1.0, dense.end), (0.5, dense.start.after(0.5 * dense.h))].into_iter().any(
+                    |(position, at)| {
+                        let new = value_of(dense, number, position);
+                        let old = solution.value(component as usize, at);
+                        old.is_none_or(|old| (new - old).abs() > tolerance * new.abs().max(old.abs()))
+                    },
+                )
             })
         };
         let mut components = trial.components.iter().enumerate();

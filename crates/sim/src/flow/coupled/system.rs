@@ -232,7 +232,7 @@ impl EquationTable {
     }
 
     /// The source of a parameter of a module with this state. `x` gives its value in the tree.
-    #[inline]
+    #[inline(always)]
     pub(super) fn source(
         &mut self,
         state: Option<&State>,
