@@ -275,14 +275,15 @@ impl<'a> Strokes<'a> {
         let light = self.style.fit.light;
         let color = self.scene.palette.get(segment.material).color;
         let depth = (a.z + b.z) / 2.0 / self.style.scale;
-        let along = self.style.fit.camera.direction(segment.direction);
+        let camera = &self.style.fit.camera;
+        let middle = nalgebra::center(&segment.start, &segment.end);
+        let directions = [segment.direction, camera.towards(middle)].map(|v| camera.direction(v));
         let strengths = match self.lighting {
-            None => light.across(along, depth, PLACES),
+            None => light.across(directions, depth, PLACES),
             Some(lighting) => {
-                let middle = nalgebra::center(&segment.start, &segment.end);
                 let radius = segment.widths.map(|width| width.resolve(self.style.fit.default_width));
-                let seen = self.style.fit.camera.project(middle);
-                lighting.across(along, (seen, (radius[0] + radius[1]) / 4.0), PLACES)
+                let seen = camera.project(middle);
+                lighting.across(directions, (seen, (radius[0] + radius[1]) / 4.0), PLACES)
             }
         };
         // Of narrow stems so few shades that many share their colours.
