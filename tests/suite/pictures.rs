@@ -162,6 +162,30 @@ fn stems_that_stand_on_the_ground_are_cut_there_in_svg_as_in_png() {
 }
 
 #[test]
+fn a_foot_that_is_seen_from_above_is_round_in_svg_as_in_png() {
+    let model = concat!(env!("CARGO_MANIFEST_DIR"), "/models/sapling.dls");
+    let folder = tempfile::tempdir().expect("a directory");
+    let drawn = |format: &str| {
+        let out = folder.path().join(format);
+        let path = out.to_str().expect("UTF-8");
+        let flags = ["render", "--quiet", "--at", "4.9", "--perspective", "60", "--format", format];
+        good(&[&flags[..], &["-o", path, model]].concat());
+        std::fs::read(out.join(format!("frame-0000.{format}"))).expect("a frame")
+    };
+    let exact = Picture::read(&drawn("png"));
+    let is_drawn = |x: usize, y: usize| exact.at(x, y)[2].abs_diff(exact.at(0, 0)[2]) > 100;
+    let rows = (0..exact.height).filter(|y| (0..exact.width).any(|x| is_drawn(x, *y)));
+    let foot = 1.0 + rows.last().expect("a plant") as f64;
+    let svg = String::from_utf8(drawn("svg")).expect("UTF-8");
+    let tree = usvg::Tree::from_str(&svg, &usvg::Options::default()).expect("an SVG");
+    let paths = crate::export::nodes(tree.root());
+    // The background reaches to the lower edge.
+    let lowest = paths.iter().map(|path| f64::from(path.abs_stroke_bounding_box().bottom()));
+    let lowest = lowest.filter(|y| *y < exact.height as f64 - 0.5).fold(0.0_f64, f64::max);
+    assert!((lowest - foot).abs() < 1.0, "{lowest}, {foot}");
+}
+
+#[test]
 fn pages_have_the_size_and_background_that_was_asked_for() {
     let scene = squares(&[(1.0, 0.0, 7.0)]);
     let mut survey = Survey::new(View::FRONT);

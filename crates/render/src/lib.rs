@@ -121,6 +121,8 @@ use dlsys_geometry::scene::Scene;
 /// Name and version of the program, for the header of files.
 pub const GENERATOR: &str = concat!("dlsys ", env!("CARGO_PKG_VERSION"));
 
+/// How much finer than in pixels surfaces are in drawings of vectors, which are looked at enlarged.
+const FINER: f64 = 2.0;
 /// How much larger or smaller than in the plane of focus surfaces are drawn with more or less detail.
 const MOST_MAGNIFIED: f64 = 100.0;
 
@@ -178,7 +180,7 @@ impl FrameWriter {
                     let nearer = fit.camera.magnification(fit.camera.project(at).z);
                     pixels * nearer.clamp(1.0 / MOST_MAGNIFIED, MOST_MAGNIFIED)
                 };
-                let accuracy = |at| draft::accuracy(scale(at), fit.accuracy * pixels);
+                let accuracy = |at| draft::accuracy(FINER * scale(at), fit.accuracy * pixels);
                 self.fit.drawn(flattened.drafted_scene(accuracy))
             }
             Content::Vectors | Content::Mesh => self.fit.drawn(flattened.tessellated(self.fit.accuracy)),

@@ -99,18 +99,25 @@ impl Light {
     }
 
     /// Strength of light across a stem that runs in this direction (to the right, up, towards the viewer; any length)
-    /// from its left edge, looking along it, to its right edge, at places from -1 to 1.
-    pub(super) fn across<const N: usize>(&self, along: Vector, depth: f64, places: [f64; N]) -> [f64; N] {
-        normals_across(along, places).map(|normal| self.strength(normal, depth))
+    /// from its left edge, looking along it, to its right edge, at places from -1 to 1. The second direction is that from the stem to the
+    /// eye: in perspective, what is beside the middle of the picture is seen from its side.
+    pub(super) fn across<const N: usize>(
+        &self,
+        [along, towards]: [Vector; 2],
+        depth: f64,
+        places: [f64; N],
+    ) -> [f64; N] {
+        normals_across([along, towards], places).map(|normal| self.strength(normal, depth))
     }
 }
 
-/// Unit normals of the visible side of a stem that runs in this direction, at places from -1, its left edge, to 1.
-pub(super) fn normals_across<const N: usize>(along: Vector, places: [f64; N]) -> [Vector; N] {
-    let left = Vector::new(-along.y, along.x, 0.0).try_normalize(1e-9).unwrap_or_else(Vector::y);
+/// Unit normals of the visible side of a stem that runs in the first direction and is seen from the second, at places from -1, its left
+/// edge, to 1.
+pub(super) fn normals_across<const N: usize>([along, towards]: [Vector; 2], places: [f64; N]) -> [Vector; N] {
+    let left = towards.cross(&along).try_normalize(1e-9).unwrap_or_else(Vector::y);
     // Towards the viewer, across the stem and its left.
     let facing = along.cross(&left).try_normalize(0.0).unwrap_or_else(Vector::z);
-    let facing = if facing.z < 0.0 { -facing } else { facing };
+    let facing = if facing.dot(&towards) < 0.0 { -facing } else { facing };
     places.map(|s| left * -s + facing * (1.0 - s * s).max(0.0).sqrt())
 }
 
@@ -123,7 +130,7 @@ mod tests {
         let light = Light::new([0.0, 0.0], 10.0, false);
         assert!(light.is_flat());
         assert_eq!(light.strength(LAMP, 0.0), 1.0);
-        assert_eq!(light.across(Vector::x(), 0.0, [-1.0, 0.0, 1.0]), [1.0; 3]);
+        assert_eq!(light.across([Vector::x(), Vector::z()], 0.0, [-1.0, 0.0, 1.0]), [1.0; 3]);
     }
 
     #[test]
@@ -135,7 +142,11 @@ mod tests {
         let lit = |x: f64, y: f64| light.strength(Vector::new(x, y, 0.0), 5.0);
         assert!(lit(-1.0, 0.0) > lit(1.0, 0.0) && lit(0.0, 1.0) > lit(0.0, -1.0));
         // A stem that grows upwards: its left is the lighter side.
-        let [left, right] = light.across(Vector::y(), 5.0, [-0.8, 0.8]);
+        let [left, right] = light.across([Vector::y(), Vector::z()], 5.0, [-0.8, 0.8]);
         assert!(left > right && right < 1.0, "{left} {right}");
+        // On the right of the picture it is seen from its left.
+        let [aside] = light.across([Vector::y(), Vector::new(-0.5, 0.0, 0.8)], 5.0, [0.0]);
+        let [ahead] = light.across([Vector::y(), Vector::z()], 5.0, [0.0]);
+        assert!(aside > ahead, "{aside} {ahead}");
     }
 }

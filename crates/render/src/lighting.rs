@@ -180,13 +180,13 @@ impl<'a> Lighting<'a> {
     /// Strengths of light across a stem of this radius at a place on its axis, as [`Light::across`](super::Light::across).
     pub(super) fn across<const N: usize>(
         &self,
-        along: Vector,
+        directions: [Vector; 2],
         (seen, radius): (Point, f64),
         places: [f64; N],
     ) -> [f64; N] {
         match self.declared {
-            None => self.fit.light.across(along, seen.z, places),
-            Some(_) => light::normals_across(along, places)
+            None => self.fit.light.across(directions, seen.z, places),
+            Some(_) => light::normals_across(directions, places)
                 .map(|normal| self.strength(&Spot { normal, seen: seen + normal * radius, is_thin: false })),
         }
     }

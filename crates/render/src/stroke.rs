@@ -78,6 +78,8 @@ pub(super) enum End {
     Mitre(usize),
     /// Straight, where the stroke continues or something else hides the rest.
     Straight,
+    /// The flat end of a stem that stands there: the outer half of the ellipse as which a disc is seen.
+    Foot,
 }
 
 /// The stems of a picture.
@@ -112,7 +114,7 @@ impl<'a> Strokes<'a> {
                     && !is_branch
                     && stands(segment, radius, scene.surroundings.floor)
                 {
-                    ends[i][0] = End::Straight;
+                    ends[i][0] = End::Foot;
                 }
                 continue;
             };
@@ -182,10 +184,10 @@ impl<'a> Strokes<'a> {
             let along = (to - from).xy().normalize() * (OVERLAP * scale / pixels);
             Point::new(to.x + along.x, to.y + along.y, to.z)
         };
-        let is_straight = ends.map(|end| end == End::Straight);
+        let cuts = [0, 1].map(|k| self.cut(segment, k, ends[k]));
+        let end_of_outline = || if ends[1] == End::Straight { overlap(a, b) } else { b };
         if from != to {
-            let end = if is_straight[1] { overlap(a, b) } else { b };
-            return outline(tapered([a, end], [wa / 2.0, wb / 2.0], is_straight));
+            return outline(tapered([a, end_of_outline()], [wa / 2.0, wb / 2.0], cuts));
         }
         // Not every renderer draws the ends of a stroke without length.
         if x1 == x2 && y1 == y2 {
@@ -195,8 +197,7 @@ impl<'a> Strokes<'a> {
         let mut look = String::with_capacity(ROOM);
         look.extend([" stroke=\"", &paint, "\" stroke-width=\"", from, "\""]);
         if ends.iter().any(|end| matches!(end, End::Mitre(_))) {
-            let end = if ends[1] == End::Straight { overlap(a, b) } else { b };
-            let data = self.mitred(ends, [a, end], wa);
+            let data = self.mitred(ends, [a, end_of_outline()], wa);
             let has_cap = |end| matches!(end, End::Round | End::Joint);
             let cap = if ends.into_iter().any(has_cap) { "" } else { " stroke-linecap=\"butt\"" };
             let attributes = format!(" fill=\"none\"{look} stroke-linejoin=\"miter\"{cap}");
@@ -204,12 +205,15 @@ impl<'a> Strokes<'a> {
         }
         let longer;
         let mut end = [x2, y2];
-        match is_straight {
-            [false, false] => {}
-            [true, false] => return outline(half_round(a, b, wa / 2.0)),
-            [false, true] => return outline(half_round(overlap(a, b), a, wa / 2.0)),
-            [true, true] => {
-                let place = overlap(a, b);
+        match cuts {
+            [None, None] => {}
+            [Some(cut), None] => return outline(half_round([a, b], wa / 2.0, cut)),
+            [None, Some(cut)] => return outline(half_round([end_of_outline(), a], wa / 2.0, cut)),
+            [Some(first), Some(last)] if first > 0.0 || last > 0.0 => {
+                return outline(tapered([a, end_of_outline()], [wa / 2.0; 2], cuts));
+            }
+            [Some(_), Some(_)] => {
+                let place = end_of_outline();
                 longer = Texts::new([place.x, place.y]);
                 end = longer.all();
                 look.push_str(" stroke-linecap=\"butt\"");
@@ -224,6 +228,26 @@ impl<'a> Strokes<'a> {
         }
         look.extend([" x1=\"", x1, "\" y1=\"", y1, "\" x2=\"", x2, "\" y2=\"", y2, "\""]);
         Some(Stroke::Element { name: "line", attributes: look })
+    }
+
+    /// Of an end that is cut: how far the cut reaches along the stroke in the picture. 0 is straight.
+    fn cut(&self, segment: &Segment, k: usize, end: End) -> Option<f64> {
+        /// Ellipses narrower than this, in pixels of the page, are lines.
+        const FLAT: f64 = 0.05;
+        if end != End::Foot {
+            return (end == End::Straight).then_some(0.0);
+        }
+        let centre = [segment.start, segment.end][k];
+        let radius = segment.widths[k].resolve(self.style.fit.default_width) / 2.0;
+        let [from, to, centre_seen] = [segment.start, segment.end, centre].map(|p| self.style.project(p));
+        let Some(way) = (to - from).xy().try_normalize(0.0) else { return Some(0.0) };
+        let ahead = segment.direction;
+        let aside = ahead.cross(&self.style.fit.camera.towards(centre)).try_normalize(1e-9);
+        let Some(aside) = aside else { return Some(0.0) };
+        let rim = [aside, ahead.cross(&aside)];
+        let reach = rim.map(|to| (self.style.project(centre + to * radius) - centre_seen).xy().dot(&way));
+        let reach = reach[0].hypot(reach[1]);
+        Some(if reach * self.style.pixels < FLAT * self.style.scale { 0.0 } else { reach })
     }
 
     /// The path of a stroke, at mitred ends with a little of the one that goes on there: what joins the two is the corner of both.
@@ -251,14 +275,15 @@ impl<'a> Strokes<'a> {
         let light = self.style.fit.light;
         let color = self.scene.palette.get(segment.material).color;
         let depth = (a.z + b.z) / 2.0 / self.style.scale;
-        let along = self.style.fit.camera.direction(segment.direction);
+        let camera = &self.style.fit.camera;
+        let middle = nalgebra::center(&segment.start, &segment.end);
+        let directions = [segment.direction, camera.towards(middle)].map(|v| camera.direction(v));
         let strengths = match self.lighting {
-            None => light.across(along, depth, PLACES),
+            None => light.across(directions, depth, PLACES),
             Some(lighting) => {
-                let middle = nalgebra::center(&segment.start, &segment.end);
                 let radius = segment.widths.map(|width| width.resolve(self.style.fit.default_width));
-                let seen = self.style.fit.camera.project(middle);
-                lighting.across(along, (seen, (radius[0] + radius[1]) / 4.0), PLACES)
+                let seen = camera.project(middle);
+                lighting.across(directions, (seen, (radius[0] + radius[1]) / 4.0), PLACES)
             }
         };
         // Of narrow stems so few shades that many share their colours.
@@ -371,8 +396,8 @@ fn push(data: &mut String, command: &str, numbers: &[f64]) {
     }
 }
 
-/// The outline of a stroke that begins straight and ends round.
-fn half_round(a: Point, b: Point, r: f64) -> String {
+/// The outline of a stroke that begins with a cut, which reaches so far along it, and ends round.
+fn half_round([a, b]: [Point; 2], r: f64, cut: f64) -> String {
     let (dx, dy) = (b.x - a.x, b.y - a.y);
     let distance = dx.hypot(dy);
     let (nx, ny) = (-dy / distance * r, dx / distance * r);
@@ -381,17 +406,26 @@ fn half_round(a: Point, b: Point, r: f64) -> String {
     push(&mut data, "L", &[b.x - nx, b.y - ny]);
     push(&mut data, "A", &[r, r, 0.0, 0.0, 1.0, b.x + nx, b.y + ny]);
     push(&mut data, "L", &[a.x + nx, a.y + ny]);
+    if cut > 0.0 {
+        push_cut(&mut data, r, cut, [dx, dy], [a.x - nx, a.y - ny]);
+    }
     data.push('Z');
     data
 }
 
-/// The outline around two circles and what lies between them, cut at those of its ends that are straight. It turns as all outlines do (clockwise to
-/// the eye), so that several that overlap can be one path.
-fn tapered([a, b]: [Point; 2], [ra, rb]: [f64; 2], is_straight: [bool; 2]) -> String {
+/// Appends the outer half of an ellipse across a stroke of this direction.
+fn push_cut(data: &mut String, r: f64, cut: f64, [dx, dy]: [f64; 2], [x, y]: [f64; 2]) {
+    let across = if dx == 0.0 { 0.0 } else { (-dx).atan2(dy).to_degrees() };
+    push(data, "A", &[r, cut, across, 0.0, 1.0, x, y]);
+}
+
+/// The outline around two circles and what lies between them, with those of its ends that are cut as far along it as the cuts reach. It turns as all
+/// outlines do (clockwise to the eye), so that several that overlap can be one path.
+fn tapered([a, b]: [Point; 2], [ra, rb]: [f64; 2], cuts: [Option<f64>; 2]) -> String {
     let (dx, dy) = (b.x - a.x, b.y - a.y);
     let distance = dx.hypot(dy);
     let mut data = String::new();
-    if distance <= (ra - rb).abs() && is_straight != [true, true] || distance == 0.0 {
+    if distance <= (ra - rb).abs() && cuts.contains(&None) || distance == 0.0 {
         // One circle holds the other.
         let (c, r) = if ra > rb { (a, ra) } else { (b, rb) };
         push(&mut data, "M", &[c.x - r, c.y]);
@@ -399,17 +433,18 @@ fn tapered([a, b]: [Point; 2], [ra, rb]: [f64; 2], is_straight: [bool; 2]) -> St
         push(&mut data, "A", &[r, r, 0.0, 0.0, 1.0, c.x - r, c.y]);
     } else {
         let (ex, ey) = (dx / distance, dy / distance);
-        // The common tangents touch at this sine from the axis; at a straight end the outline is where the radius ends.
+        // The common tangents touch at this sine from the axis; at a cut the outline is where the radius ends.
         let touch = |k: usize, side: f64| {
-            let sin = if is_straight[k] { 0.0 } else { (ra - rb) / distance };
+            let sin = if cuts[k].is_some() { 0.0 } else { (ra - rb) / distance };
             let cos = (1.0 - sin * sin).sqrt();
             let (c, r) = [(a, ra), (b, rb)][k];
             [c.x + r * (sin * ex - side * cos * ey), c.y + r * (sin * ey + side * cos * ex)]
         };
         let large = |this: f64, other: f64| if this > other { 1.0 } else { 0.0 };
-        let end = |data: &mut String, k: usize, [r, other]: [f64; 2], [x, y]: [f64; 2]| match is_straight[k] {
-            true => push(data, "L", &[x, y]),
-            false => push(data, "A", &[r, r, 0.0, large(r, other), 1.0, x, y]),
+        let end = |data: &mut String, k: usize, [r, other]: [f64; 2], [x, y]: [f64; 2]| match cuts[k] {
+            Some(cut) if cut > 0.0 => push_cut(data, r, cut, [dx, dy], [x, y]),
+            Some(_) => push(data, "L", &[x, y]),
+            None => push(data, "A", &[r, r, 0.0, large(r, other), 1.0, x, y]),
         };
         push(&mut data, "M", &touch(0, 1.0));
         end(&mut data, 0, [ra, rb], touch(0, -1.0));

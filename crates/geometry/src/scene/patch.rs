@@ -71,7 +71,7 @@ impl Patch {
     /// The same for a picture, of fewer triangles: pieces are any number, not a power of two, and their
     /// deviation is an estimate.
     pub fn draft(&self, accuracy: f64) -> Surface {
-        self.placed(accuracy, Steps::Whole)
+        self.placed(accuracy, Steps::Shape)
     }
 
     fn placed(&self, accuracy: f64, steps: Steps) -> Surface {
@@ -145,7 +145,7 @@ impl PatchSet {
     pub fn draft(&self, accuracy: f64) -> Arc<Mesh> {
         let exponent = (4.0 * accuracy.log2()).floor().clamp(-160.0, 12.0);
         let accuracy = (exponent / 4.0).exp2();
-        self.kept(&self.drafts, exponent as i32, accuracy, Steps::Whole)
+        self.kept(&self.drafts, exponent as i32, accuracy, Steps::Shape)
     }
 
     fn kept(
@@ -197,6 +197,11 @@ struct Paint {
 /// Adds the triangles of a patch.
 fn tessellate(net: &Net, accuracy: f64, steps: Steps, paint: Paint, mesh: &mut Mesh) {
     let accuracy = if accuracy > 0.0 { accuracy } else { f64::MIN_POSITIVE };
+    let steps = match steps {
+        // A picture is where its places are.
+        Steps::Shape if paint.has_picture => Steps::Whole,
+        steps => steps,
+    };
     // Half of the deviation for the edge, half for the triangles that lead to it.
     let [bottom, top, left, right] = edges(net).map(|edge| steps.of_edge(&edge, accuracy / 2.0));
     let (columns, rows) = steps.of_grid(net, accuracy);
@@ -489,9 +494,11 @@ mod tests {
     #[test]
     fn drafts_are_as_near_as_they_should_with_fewer_triangles() {
         let net = raised(|c, r| 0.3 * (c * 1.7).sin() + 0.2 * c * r - 0.15 * r * r);
-        for accuracy in [0.1, 1e-2, 1e-3] {
+        for (accuracy, steps) in
+            [0.1, 1e-2, 1e-3].into_iter().flat_map(|a| [(a, Steps::Whole), (a, Steps::Shape)])
+        {
             let mut draft = Mesh::new();
-            tessellate(&net, accuracy, Steps::Whole, PAINT, &mut draft);
+            tessellate(&net, accuracy, steps, Paint { has_picture: false, ..PAINT }, &mut draft);
             let strict = mesh(&net, accuracy).faces.len();
             assert!(draft.faces.len() <= strict && (accuracy > 5e-3 || draft.faces.len() < strict));
             for face in &draft.faces {
@@ -502,5 +509,18 @@ mod tests {
                 assert!(away <= 1.5 * accuracy, "{away} > {accuracy}");
             }
         }
+    }
+
+    #[test]
+    fn a_flat_patch_is_few_triangles_however_its_places_are_spread() {
+        let mut net = raised(|_, _| 0.0);
+        // Inner points are drawn to one side; the edges are straight, with even places.
+        net[1..3].iter_mut().flat_map(|row| &mut row[1..3]).for_each(|p| p.x += 0.6);
+        let faces = |steps| {
+            let mut draft = Mesh::new();
+            tessellate(&net, 1e-3, steps, Paint { has_picture: false, ..PAINT }, &mut draft);
+            draft.faces.len()
+        };
+        assert!(4 * faces(Steps::Shape) < faces(Steps::Whole));
     }
 }

@@ -10,6 +10,8 @@ pub(super) const FINEST: usize = 64;
 const PROBES: [f64; 3] = [0.125, 0.5, 0.875];
 /// Between the probes derivatives may be larger: the part of them that is found there.
 const CAUTION: f64 = 0.75;
+/// What moves places within the surface changes no shape, but the places of shades: it counts with this part where the shape is all that is seen.
+const WITHIN: f64 = 0.2;
 
 /// The numbers of pieces that an edge may have.
 #[derive(Clone, Copy)]
@@ -19,12 +21,14 @@ pub(super) enum Steps {
     /// Any, so that there are no more triangles than the accuracy asks for: for pictures. Deviations within the patch are estimated from second
     /// derivatives at a few places.
     Whole,
+    /// The same where the shape is all that is seen: what moves places within the surface hardly counts.
+    Shape,
 }
 
 impl Steps {
     /// The least number of pieces whose square is at least this.
     fn pieces(self, square: f64) -> usize {
-        if let Steps::Whole = self {
+        if let Steps::Whole | Steps::Shape = self {
             return (square.sqrt().ceil() as usize).clamp(1, FINEST);
         }
         let mut n = 1;
@@ -46,13 +50,15 @@ impl Steps {
     pub(super) fn of_grid(self, net: &Net, accuracy: f64) -> (usize, usize) {
         match self {
             Steps::Powers => powers(strict_derivatives(net), accuracy),
-            Steps::Whole => fewest(estimated_derivatives(net), accuracy),
+            Steps::Whole => fewest(estimated_derivatives(net, 1.0), accuracy),
+            Steps::Shape => fewest(estimated_derivatives(net, WITHIN), accuracy),
         }
     }
 }
 
-/// The greatest second derivatives at the probes and a little more, or their bounds: along rows, mixed, along columns.
-fn estimated_derivatives(net: &Net) -> [f64; 3] {
+/// The greatest second derivatives at the probes and a little more, or their bounds: along rows, mixed, along columns. Of what lies within the surface
+/// a part counts.
+fn estimated_derivatives(net: &Net, within: f64) -> [f64; 3] {
     let mut greatest = [0.0_f64; 3];
     let at = PROBES.map(|t| (weights(t), slopes(t), bends(t)));
     for (values_u, slopes_u, bends_u) in &at {
@@ -62,8 +68,12 @@ fn estimated_derivatives(net: &Net) -> [f64; 3] {
                 sum(net, *slopes_u, *slopes_v),
                 sum(net, *values_u, *bends_v),
             ];
+            let across = sum(net, *slopes_u, *values_v).cross(&sum(net, *values_u, *slopes_v));
+            let normal = across.try_normalize(f64::MIN_POSITIVE);
             for (greatest, second) in greatest.iter_mut().zip(second) {
-                *greatest = greatest.max(second.norm());
+                let size = second.norm();
+                let off = normal.map_or(size, |normal| normal.dot(&second).abs());
+                *greatest = greatest.max(off + within * (size - off));
             }
         }
     }

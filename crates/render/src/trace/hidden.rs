@@ -18,6 +18,8 @@ const ACROSS: [f64; 5] = [0.0, -0.4, 0.4, -0.8, 0.8];
 const SHORTEST: f64 = 2.0;
 /// How far from the end of a stem its dome is examined, in radii.
 const DOME: f64 = 0.6;
+/// Sine of the angle between a stem and the view, as far as it counts: of stems that are seen nearly end on it would be 0.
+const LEAST_SLANT: f64 = 0.2;
 /// Most of the steps along a thin stem at which only a part of its width may be hidden.
 const MOST_CUT: f64 = 0.2;
 /// Most of the places on a stem that may be hidden though it counts as one that nothing hides.
@@ -31,6 +33,15 @@ pub struct Visible<'a> {
     pub labels: &'a [u32],
     pub size: [usize; 2],
     pub placement: [f64; 3],
+}
+
+/// The side of a stem that is seen at a slant is further in front of its axis than its radius.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Slant {
+    /// So it hides itself: its bends and forks are much of what is seen of it, and a stroke has none.
+    Hides,
+    /// What is a stroke does not hide itself.
+    Counts,
 }
 
 /// Which places on a stem are visible, in steps along it.
@@ -47,7 +58,7 @@ impl Visible<'_> {
         if self.length(segment) < SHORTEST * pixels_across(segment, self.style) {
             return false;
         }
-        let seen = self.seen(segment, &ACROSS);
+        let seen = self.seen(segment, &ACROSS, Slant::Hides);
         let Some([first, end]) = seen.range() else { return false };
         let steps = &seen.steps[first..end];
         let visible: usize = steps.iter().map(|(count, _)| count).sum();
@@ -63,7 +74,7 @@ impl Visible<'_> {
 
     /// Whether what hides a thin segment hides its whole width, but for a few places: its visible parts are then strokes.
     pub fn is_cut_across(&self, segment: &Segment) -> bool {
-        let seen = self.seen(segment, &ACROSS);
+        let seen = self.seen(segment, &ACROSS, Slant::Hides);
         let cut = |(count, _): &&(usize, bool)| (1..ACROSS.len()).contains(count);
         seen.steps.iter().filter(cut).count() as f64 <= MOST_CUT * seen.steps.len() as f64
     }
@@ -72,7 +83,7 @@ impl Visible<'_> {
     /// segment is clear, so it is one part.
     pub fn parts(&self, segment: &Segment, ends: [End; 2], is_thin: bool) -> Vec<(Segment, [End; 2])> {
         let across = if is_thin { &ACROSS[..1] } else { &ACROSS[..] };
-        let seen = self.seen(segment, across);
+        let seen = self.seen(segment, across, Slant::Counts);
         let count = seen.steps.len();
         let [a, ..] = self.placement;
         let reach = UNDER_CELLS + UNDER * pixels_across(segment, self.style) / self.style.pixels * a;
@@ -94,9 +105,16 @@ impl Visible<'_> {
         let radius = segment.widths[end].resolve(self.style.fit.default_width) / 2.0;
         let (from, sign) = if end == 0 { (segment.start, -1.0) } else { (segment.end, 1.0) };
         let [a, b, c] = self.placement;
-        let seen = self.style.fit.camera.project(from + segment.direction * (sign * DOME * radius));
-        let front = radius * (1.0 - DOME * DOME).sqrt();
-        self.is_seen([a * seen.x + b, c - a * seen.y], (seen.z + front) / self.extent())
+        let camera = &self.style.fit.camera;
+        let at = from + segment.direction * (sign * DOME * radius);
+        let (seen, towards) = (camera.project(at), camera.towards(at));
+        // From there to the surface of the dome, or to that of the stem, if it is before the dome.
+        let cosine = sign * segment.direction.dot(&towards);
+        let ahead = DOME * cosine;
+        let dome = (ahead * ahead + 1.0 - DOME * DOME).sqrt() - ahead;
+        let stem = if cosine < 0.0 { 1.0 / (1.0 - cosine * cosine).sqrt().max(LEAST_SLANT) } else { 0.0 };
+        let front = camera.project(at + towards * (radius * dome.max(stem))).z;
+        self.is_seen([a * seen.x + b, c - a * seen.y], front / self.extent())
     }
 
     fn extent(&self) -> f64 {
@@ -115,8 +133,18 @@ impl Visible<'_> {
         self.cell(place).is_none_or(|cell| (depth + NEARER) as f32 >= self.depths[cell][0])
     }
 
+    /// How much nearer than the axis the side of a stem is in front of it, at one of its ends.
+    fn front(&self, segment: &Segment, end: usize) -> f64 {
+        let camera = &self.style.fit.camera;
+        let at = [segment.start, segment.end][end];
+        let radius = segment.widths[end].resolve(self.style.fit.default_width) / 2.0;
+        let towards = camera.towards(at);
+        let sine = segment.direction.cross(&towards).norm().max(LEAST_SLANT);
+        camera.project(at + towards * (radius / sine)).z - camera.project(at).z
+    }
+
     /// Which places on a segment are visible.
-    fn seen(&self, segment: &Segment, across: &[f64]) -> Seen {
+    fn seen(&self, segment: &Segment, across: &[f64], slant: Slant) -> Seen {
         let camera = &self.style.fit.camera;
         let [a, b, c] = self.placement;
         let extent = self.extent();
@@ -128,9 +156,13 @@ impl Visible<'_> {
         let ([x2, y2], z2) = at(segment.end);
         let length = (x2 - x1).hypot(y2 - y1);
         let pieces = length.ceil().clamp(1.0, MOST_PIECES) as usize;
-        // In cells, and in parts of the extent.
+        // In cells.
         let radius = pixels_across(segment, self.style) / self.style.pixels * a / 2.0;
-        let front = radius / a / extent;
+        let fronts = match slant {
+            Slant::Hides => [radius / a / extent; 2],
+            Slant::Counts => [0, 1].map(|k| self.front(segment, k) / extent),
+        };
+        let front = |k: usize| fronts[0] + (fronts[1] - fronts[0]) * ((k as f64 + 0.5) / pieces as f64);
         let aside = if length > 0.0 { [(y2 - y1) / length, (x1 - x2) / length] } else { [1.0, 0.0] };
         let place =
             |k: usize| segment.start + (segment.end - segment.start) * ((k as f64 + 0.5) / pieces as f64);
@@ -139,7 +171,7 @@ impl Visible<'_> {
         let step = |k: usize| {
             let ([x, y], depth) = at(place(k));
             let place = |u: &f64| [x + aside[0] * radius * u, y + aside[1] * radius * u];
-            let mut visible = across.iter().map(|u| self.is_seen(place(u), depth + front + slope));
+            let mut visible = across.iter().map(|u| self.is_seen(place(u), depth + front(k) + slope));
             let on_axis = visible.next().unwrap_or(false);
             (usize::from(on_axis) + visible.filter(|seen| *seen).count(), on_axis)
         };
