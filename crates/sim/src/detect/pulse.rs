@@ -97,8 +97,10 @@ pub struct ExaminedStep<'p> {
     pub own: Option<&'p Dense>,
     /// The largest contribution to the values that may be overlooked.
     pub tolerance: f64,
-    /// The equations are stiff: their terms are examined one by one.
+    /// The equations are stiff.
     pub stiff: bool,
+    /// Neighbours were constant while the step was made.
+    pub sliced: bool,
 }
 
 impl ExaminedStep<'_> {
@@ -169,7 +171,7 @@ impl PulseDetector {
         for (terms, scale) in own {
             first = first.earlier(self.examine_terms(&Examination { step, terms, scale, reader: None }));
         }
-        if first == PulseFinding::Clear && !step.stiff {
+        if first == PulseFinding::Clear && !step.stiff && !step.sliced {
             first = along(step, |path, _| self.examine_between(step, path));
         }
         let mut offset = step.world.tree.parameters(step.state.id).len();

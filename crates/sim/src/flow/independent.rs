@@ -268,6 +268,7 @@ impl FlowStage<'_, '_> {
                 own,
                 tolerance,
                 stiff,
+                sliced: self.setup.settings.is_sliced(),
             };
             match overlooked(self.detector, &examined, index, tries) {
                 Some(at) if dense.h > least => {

@@ -156,7 +156,7 @@ impl FlowStage<'_, '_> {
         let stiff = control.stiff || settings.method.is_implicit();
         let nodes = integrator.nodes();
         let overlooked = pulsing.iter().filter_map(|id| {
-            let how = (settings.tolerance, stiff);
+            let how = (settings.tolerance, stiff, settings.is_sliced());
             let step = examined_step(self.world, &self.setup.model.rules, *id, from, &nodes, how)?;
             match self.detector.pulses.examine(&step) {
                 PulseFinding::Clear => None,
@@ -323,7 +323,8 @@ impl FlowStage<'_, '_> {
             return false;
         }
         let pulsing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_pulse(*id)).collect();
-        let how = (self.setup.coupled_settings.tolerance, self.flows.coupled.control.stiff);
+        let settings = &self.setup.coupled_settings;
+        let how = (settings.tolerance, self.flows.coupled.control.stiff, settings.is_sliced());
         let (world, rules, pulses) = (&self.world, &self.setup.model.rules, &mut self.detector.pulses);
         let nodes = &*self.flows.coupled.reintegration.nodes();
         pulsing.into_iter().any(|id| {
@@ -366,10 +367,23 @@ fn examined_step<'p>(
     id: ModuleId,
     start: SimTime,
     nodes: &'p [f64],
-    (tolerance, stiff): (f64, bool),
+    (tolerance, stiff, sliced): (f64, bool, bool),
 ) -> Option<ExaminedStep<'p>> {
     let state = world.state(id)?;
     let rule = &rules[state.rule?];
     let (solve, end) = (&rule.solves[state.solve?], world.coupled.as_ref()?.end);
-    Some(ExaminedStep { world, rules, state, rule, solve, start, end, nodes, own: None, tolerance, stiff })
+    Some(ExaminedStep {
+        world,
+        rules,
+        state,
+        rule,
+        solve,
+        start,
+        end,
+        nodes,
+        own: None,
+        tolerance,
+        stiff,
+        sliced,
+    })
 }
