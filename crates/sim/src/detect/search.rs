@@ -298,12 +298,9 @@ impl Search<'_, '_> {
         Together { instant, uncertain: instant.max(first + slack), atom }
     }
 
-    /// True if the errors of integration leave it open which of two atoms changes first, and a production depends on both. Levels of one value are
-    /// taken in their order, whatever its error is; and conditions inside equations change where they do.
+    /// True if the errors of integration leave it open which of two atoms changes first. Levels of one value are taken in their order, whatever its
+    /// error is.
     fn share_uncertainty(&self, first: usize, other: usize) -> bool {
-        if !self.decides(first) || !self.decides(other) {
-            return false;
-        }
         let moving = |atom: usize| -> SmallVec<[usize; 4]> {
             self.path.rule.atom_reads[atom].iter().copied().filter(|v| self.path.moves(*v)).collect()
         };
