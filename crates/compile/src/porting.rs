@@ -35,6 +35,11 @@ pub fn strays(document: &Document, diagnostics: &mut Vec<Diagnostic>) {
                 "this is a roll by `angle`",
                 "a string goes on in the next line by itself: leave the sign out, or begin the next line with it",
             ),
+            Stray::Directive => (
+                "this line is a comment",
+                "`#` begins a comment; nothing is included, defined or left out",
+                "write `include \"FILE.dls\"`, `const NAME = VALUE` or `def NAME(x) = …`; lines between `#ifdef` and `#endif` count: delete those that are not meant",
+            ),
             Stray::End => (
                 "`;` does not end a line",
                 "this takes the next colour for what follows",

@@ -83,6 +83,8 @@ pub enum Stray {
     Continuation,
     /// `;` at the end of a line, a colour.
     End,
+    /// A line for the preprocessor of C, which is a comment: `#include "FILE"`.
+    Directive,
 }
 
 /// The places of such signs: where a line would be strange without them being meant as in C.

@@ -270,6 +270,26 @@ pub fn remainder(x: &str, y: &str) -> String {
     format!("a remainder is written `{x} - {y}*floor({x}/{y})`", x = grouped(x), y = grouped(y))
 }
 
+/// The places of lines for the preprocessor of C, which are comments in this language. A comment that begins with such a word has a space before it.
+pub fn directives(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1));
+    starts.filter_map(|start| {
+        let line = text[start..].lines().next()?;
+        let at = line.len() - line.trim_start().len();
+        let (word, rest) =
+            line[at..].trim_end().split_once([' ', '\t']).unwrap_or((line[at..].trim_end(), ""));
+        let (rest, is_alone) = (rest.trim_start(), !rest.trim().contains([' ', '\t']));
+        let is_one = match word {
+            "#include" => rest.starts_with(['"', '<']),
+            "#ifdef" | "#ifndef" | "#undef" => !rest.is_empty() && is_alone,
+            "#endif" | "#else" => rest.is_empty(),
+            "#define" => commented_definitions(&line[at..]).next().is_some(),
+            _ => false,
+        };
+        is_one.then_some((start + at, word))
+    })
+}
+
 /// Names and values in lines such as `#define K 0.5`, which are comments in this language.
 pub fn commented_definitions(text: &str) -> impl Iterator<Item = (&str, &str)> {
     text.lines().filter_map(|line| {
@@ -329,6 +349,13 @@ mod tests {
         let text = "F #(0.5) A\n[#(w*0.7)F]\nF  #(as measured)\nF # not #(2)\n#(width)\n#(1";
         let found: Vec<&str> = commented_widths(text).map(|(_, inside)| inside).collect();
         assert_eq!(found, ["0.5", "w*0.7", "width"]);
+    }
+
+    #[test]
+    fn lines_for_the_preprocessor_are_found_and_other_comments_are_not() {
+        let text = "#include \"a.h\"\n  #ifdef X\n# include \"b\"\n#define K 2\n#endif\n#include the sun\n#else we say\nF #endif\n";
+        let found: Vec<_> = directives(text).collect();
+        assert_eq!(found, [(0, "#include"), (17, "#ifdef"), (40, "#define"), (52, "#endif")]);
     }
 
     #[test]

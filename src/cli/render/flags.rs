@@ -50,6 +50,12 @@ pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 11] {
     ]
 }
 
+/// Endings of pictures, films and meshes of other programs.
+const OTHERS: [&str; 17] = [
+    "jpg", "jpeg", "bmp", "tif", "tiff", "tga", "pdf", "eps", "ps", "exr", "avi", "mov", "mkv", "fbx", "stl",
+    "ply", "dae",
+];
+
 /// Refuses flags that have no meaning for the format or the layout.
 pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
     if args.speed.is_some() {
@@ -64,6 +70,22 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
     }
     let extension = args.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let is_file = |name: &str| extension == name;
+    if !args.out.is_dir() && OTHERS.contains(&&*extension) {
+        return Err(usage(format!(
+            "no format of dlsys writes .{extension}, and -o {} would be a folder; write a .svg, .png, .webp, .gif, .glb, .usda or .obj file",
+            args.out.display()
+        )));
+    }
+    if !args.out.is_dir()
+        && extension != format.extension()
+        && Format::all().any(|other| is_file(other.extension()))
+    {
+        return Err(usage(format!(
+            "-o {} says {extension} and --format says {}: leave --format out, or change the ending",
+            args.out.display(),
+            format.extension()
+        )));
+    }
     let known = Format::all()
         .map(Format::extension)
         .chain(["gif", "webp", "apng", "y4m", "mp4", "webm", "glb", "usda"]);

@@ -63,6 +63,9 @@ impl Reader {
             let known = foreign_syntax::commented_definitions(text);
             self.document.commented.extend(known.map(|(name, meaning)| (name.into(), meaning.to_owned())));
         }
+        for (at, word) in foreign_syntax::directives(text) {
+            self.document.strays.push((Span::new(at, at + word.len()), Stray::Directive));
+        }
         for (at, inside) in foreign_syntax::commented_widths(text) {
             let in_item = cut.items.iter().rfind(|item| item.start < at).is_some_and(|item| {
                 matches!(item.kind, ItemKind::Rule | ItemKind::Step) || item.kind.has_string()
