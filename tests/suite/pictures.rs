@@ -174,8 +174,8 @@ fn a_foot_that_is_seen_from_above_is_round_in_svg_as_in_png() {
     };
     let exact = Picture::read(&drawn("png"));
     let is_drawn = |x: usize, y: usize| exact.at(x, y)[2].abs_diff(exact.at(0, 0)[2]) > 100;
-    let rows = (0..exact.height).filter(|y| (0..exact.width).any(|x| is_drawn(x, *y)));
-    let foot = 1.0 + rows.last().expect("a plant") as f64;
+    let mut rows = (0..exact.height).filter(|y| (0..exact.width).any(|x| is_drawn(x, *y)));
+    let foot = 1.0 + rows.next_back().expect("a plant") as f64;
     let svg = String::from_utf8(drawn("svg")).expect("UTF-8");
     let tree = usvg::Tree::from_str(&svg, &usvg::Options::default()).expect("an SVG");
     let paths = crate::export::nodes(tree.root());

@@ -106,10 +106,7 @@ pub struct ExaminedStep<'p> {
 impl ExaminedStep<'_> {
     /// True if a value, or a rate times the length of the step, differs from that of the dense output by more than it does where all is smooth.
     fn is_far(&self, a: f64, b: f64, size: f64) -> bool {
-        (a - b)
-            .abs()
-            .partial_cmp(&(DEFECT * self.tolerance * size.abs().max(1.0)))
-            .is_none_or(|order| order.is_gt())
+        exceeds((a - b).abs(), DEFECT * self.tolerance * size.abs().max(1.0))
     }
 }
 
@@ -358,7 +355,7 @@ impl PulseDetector {
                         .fold(0.0, f64::max)
                 }
             };
-            !(effect * share <= tolerance)
+            exceeds(effect * share, tolerance)
         })
     }
 
@@ -433,6 +430,11 @@ impl PulseDetector {
             }
         }
     }
+}
+
+/// True if a number is larger than another, or one of them is none.
+fn exceeds(a: f64, b: f64) -> bool {
+    a.partial_cmp(&b).is_none_or(|order| order.is_gt())
 }
 
 /// The largest difference of two lists; infinite where one of them has no number.
