@@ -37,8 +37,8 @@ pub fn strays(document: &Document, diagnostics: &mut Vec<Diagnostic>) {
             ),
             Stray::Directive => (
                 "this line is a comment",
-                "`#` begins a comment; nothing is included, defined or left out",
-                "write `include \"FILE.dls\"`, `const NAME = VALUE` or `def NAME(x) = …`; lines between `#ifdef` and `#endif` count: delete those that are not meant",
+                "`#` begins a comment; nothing is included or left out",
+                "write `include \"FILE.dls\"`; lines between `#ifdef` and `#endif` count: delete those that are not meant",
             ),
             Stray::End => (
                 "`;` does not end a line",
