@@ -44,6 +44,7 @@ mod pictures;
 mod plants;
 mod ported;
 mod precision;
+mod pulses;
 mod random;
 mod repl;
 mod replay;

@@ -99,7 +99,7 @@ impl Surroundings<'_> {
             .filter(|(_, term)| clause.varies(graph, *term, true))
             .map(|(i, _)| (declared.first_aggregate + i) as u32)
             .collect();
-        let mut finder =
+        let finder =
             Finder { clause: &clause, hazy: &hazy, total: declared.variables + solve.switches.len() };
         let rates = |closed: bool| -> Vec<(usize, NodeId)> {
             let forms = solve.rates.iter().zip(solution_forms);
@@ -126,7 +126,7 @@ impl Finder<'_> {
     /// The terms of some expressions, with the parameters whose rates or values they are, and of some equations, with the estimate of what each tells of its
     /// unknown. `by_pace`: what a step does not resolve counts.
     fn terms(
-        &mut self,
+        &self,
         graph: &mut Graph,
         expressions: &[(usize, NodeId)],
         equations: &[(usize, NodeId, NodeId)],
@@ -172,7 +172,7 @@ impl Finder<'_> {
     }
 
     /// The terms of the values of the clause. What is solved for tells nothing about pulses in its own equation.
-    fn values(&mut self, graph: &mut Graph) -> PulseTerms {
+    fn values(&self, graph: &mut Graph) -> PulseTerms {
         let of = |explicit: bool| {
             let entries = self.clause.solve.algebraic.iter().filter(move |entry| entry.explicit == explicit);
             entries.map(|entry| (entry.parameter, entry.node)).collect::<Vec<_>>()

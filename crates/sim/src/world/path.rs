@@ -206,14 +206,7 @@ impl<'p> Path<'p> {
     pub fn sum_over(&self, sum: &AffineSum, lo: f64, hi: f64) -> Option<Dual<Interval>> {
         let (mut constant, mut moving) = (sum.constant, None);
         for &(variable, factor) in &sum.terms {
-            let mut parameter = variable;
-            let mut modules = std::iter::once(&self.state.id).chain(self.state.context.context());
-            let id = *modules.find(|id| {
-                let count = self.world.tree.parameters(**id).len();
-                let is_here = parameter < count;
-                parameter -= if is_here { 0 } else { count };
-                is_here
-            })?;
+            let (id, parameter) = self.place_of(variable)?;
             let state = self.world.state(id);
             match state.and_then(|state| Some((state, state.trajectories.get(parameter)?))) {
                 Some((state, trajectory)) if !matches!(trajectory, Trajectory::Rest) => {
@@ -264,31 +257,33 @@ impl<'p> Path<'p> {
                     || children
                         .any(|id| self.world.state(*id).is_some_and(|s| s.trajectories.iter().any(numeric)));
             }
-            let mut parameter = variable;
-            for id in std::iter::once(&self.state.id).chain(self.state.context.context()) {
-                let count = self.world.tree.parameters(*id).len();
-                if parameter < count {
-                    let trajectory = self.world.state(*id).and_then(|s| s.trajectories.get(parameter));
-                    return trajectory.is_some_and(numeric);
-                }
-                parameter -= count;
-            }
-            false
+            self.law_of(variable).is_some_and(numeric)
         })
+    }
+
+    /// The module of the rule or its context that has a variable for a parameter, and the number of that; None for aggregates and times.
+    fn place_of(&self, variable: usize) -> Option<(ModuleId, usize)> {
+        let mut parameter = variable;
+        for &id in std::iter::once(&self.state.id).chain(self.state.context.context()) {
+            let count = self.world.tree.parameters(id).len();
+            if parameter < count {
+                return Some((id, parameter));
+            }
+            parameter -= count;
+        }
+        None
+    }
+
+    /// The trajectory of a variable that is a parameter of a module with equations.
+    fn law_of(&self, variable: usize) -> Option<&Trajectory> {
+        let (id, parameter) = self.place_of(variable)?;
+        self.world.state(id)?.trajectories.get(parameter)
     }
 
     /// False for a variable that is a parameter at rest.
     pub fn moves(&self, variable: usize) -> bool {
-        let mut parameter = variable;
-        for id in std::iter::once(&self.state.id).chain(self.state.context.context()) {
-            let count = self.world.tree.parameters(*id).len();
-            if parameter < count {
-                let law = self.world.state(*id).and_then(|s| s.trajectories.get(parameter));
-                return law.is_some_and(|law| !matches!(law, Trajectory::Rest));
-            }
-            parameter -= count;
-        }
-        true
+        let rests = self.law_of(variable).is_none_or(|law| matches!(law, Trajectory::Rest));
+        self.place_of(variable).is_none() || !rests
     }
 
     /// The estimated error of integrated values along the path, relative to their size; 0 if there are none.
