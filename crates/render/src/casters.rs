@@ -8,6 +8,7 @@ use std::collections::HashMap;
 
 use super::Fit;
 use super::draft::{Detail, Draft};
+use super::threads::side_by_side;
 use super::triangles::Triangle;
 use dlsys_geometry::scene::{MaterialId, Placement, Point, Scene, Texture, Vector};
 
@@ -15,6 +16,11 @@ use dlsys_geometry::scene::{MaterialId, Placement, Point, Scene, Texture, Vector
 const BATCH: usize = 1 << 16;
 /// Most triangles of drafts that are kept from the measuring of the scene to its shadows; the others are made twice.
 const KEPT: usize = 2_000_000;
+
+/// Drafts that are measured side by side.
+const SIDE_BY_SIDE: usize = 64;
+/// Triangles are no nearer to curved surfaces than this, in pixels, of which a cell of a shadow map has one or more: the edges of shadows are smooth over three cells.
+const SLACK: f64 = 0.7;
 
 /// A triangle of which parts are cut out: corners, their places in the picture, and that.
 pub(super) type CutTriangle<'s> = ([u32; 3], [[f64; 2]; 3], &'s Texture);
@@ -62,7 +68,7 @@ pub(super) struct Casters<'s> {
     /// Of the scene's own elements, those of this material cast no shadows.
     without: Option<MaterialId>,
     groups: Vec<Group<'s>>,
-    numbers: HashMap<(*const Scene, i32), usize>,
+    numbers: HashMap<(usize, i32), usize>,
     /// By group, if it is kept.
     drafts: Vec<Option<Draft<'s>>>,
     around: Reach,
@@ -98,6 +104,14 @@ impl Around {
     }
 }
 
+/// A draft, boxes around its ground of soil and all else wherever it is, and how much there is of it.
+struct Measured<'s> {
+    draft: Draft<'s>,
+    soil: Around,
+    around: Around,
+    count: usize,
+}
+
 impl<'s> Casters<'s> {
     /// All that a scene has, but for what is of a material of its own, at so many pixels for a scene unit; plants as coarse as they are seen
     /// with `scale_at` pixels. Of the plants, those count whose ball (middle and radius) does.
@@ -108,6 +122,7 @@ impl<'s> Casters<'s> {
         scale_at: impl Fn(Point) -> f64,
         without: Option<MaterialId>,
         counts: impl Fn(Point, f64) -> bool,
+        threads: usize,
     ) -> Casters<'s> {
         let own = Group { scene, default_width: fit.default_width, scale, places: vec![None] };
         let mut casters = Casters {
@@ -122,7 +137,7 @@ impl<'s> Casters<'s> {
             count: 0,
         };
         casters.gather(scene, None, &scale_at, &counts);
-        casters.measure();
+        casters.measure(threads);
         casters
     }
 
@@ -148,12 +163,13 @@ impl<'s> Casters<'s> {
             let seen = Some(scale_at(middle)).filter(|seen| *seen > 0.0);
             let scale = seen.map_or(self.scale, |seen| seen.min(self.scale)) * placement.largest();
             let exponent = scale.log2().ceil().clamp(-60.0, 60.0) as i32;
-            let number = *self.numbers.entry((&raw const *plant.scene, exponent)).or_insert_with(|| {
-                let scale = 2_f64.powi(exponent);
-                let default_width = plant.default_width();
-                self.groups.push(Group { scene: &plant.scene, default_width, scale, places: Vec::new() });
-                self.groups.len() - 1
-            });
+            let number =
+                *self.numbers.entry(((&raw const *plant.scene).addr(), exponent)).or_insert_with(|| {
+                    let scale = 2_f64.powi(exponent);
+                    let default_width = plant.default_width();
+                    self.groups.push(Group { scene: &plant.scene, default_width, scale, places: Vec::new() });
+                    self.groups.len() - 1
+                });
             self.groups[number].places.push(Some(placement));
             self.gather(&plant.scene, Some(&placement), scale_at, counts);
         }
@@ -163,7 +179,7 @@ impl<'s> Casters<'s> {
         let detail = Detail {
             scale_at: |_| group.scale,
             scale_of: None,
-            accuracy: self.fit.accuracy,
+            accuracy: self.fit.accuracy.max(SLACK / self.scale),
             scale: self.scale,
             is_flat: false,
             floor: group.scene.surroundings.floor,
@@ -182,36 +198,47 @@ impl<'s> Casters<'s> {
     }
 
     /// Finds the box around everything, and how much there is.
-    fn measure(&mut self) {
+    fn measure(&mut self, threads: usize) {
         let (mut around, mut core) = (Around::nothing(), Around::nothing());
         let (mut count, mut kept) = (0, 0);
         let mut drafts = Vec::with_capacity(self.groups.len());
-        for group in &self.groups {
-            let draft = self.draft(group);
-            for place in &group.places {
-                let place = place.as_ref();
-                let vertices = &draft.mesh.vertices;
-                let soil = group.scene.terrain.filter(|_| place.is_none());
-                for face in self.casting(&draft.mesh.faces, place) {
-                    let is_soil = Some(face.owner) == soil;
-                    for (v, _) in face.corners {
-                        let at = vertices[v as usize];
-                        let at = place.map_or(at, |place| place.point(at)).coords;
-                        if is_soil { &mut around } else { &mut core }.include(&at);
-                    }
-                }
-                for end in draft.lines(place).flat_map(|(ends, _)| ends) {
-                    core.include(&end.coords);
-                }
-                count += self.casting(&draft.mesh.faces, place).count() + draft.lines(place).count();
+        for groups in self.groups.chunks(SIDE_BY_SIDE) {
+            for measured in side_by_side(groups.len(), threads, |i| self.measured(&groups[i])) {
+                around.merge(&measured.soil);
+                core.merge(&measured.around);
+                count += measured.count;
+                kept += measured.draft.len();
+                drafts.push(Some(measured.draft).filter(|_| kept <= KEPT));
             }
-            kept += draft.len();
-            drafts.push(Some(draft).filter(|_| kept <= KEPT));
         }
         (self.drafts, self.count) = (drafts, count);
         around.merge(&core);
         self.around = around.reach().unwrap_or(self.around);
         self.core = core.reach().unwrap_or(self.around);
+    }
+
+    fn measured(&self, group: &Group<'s>) -> Measured<'s> {
+        let draft = self.draft(group);
+        let (mut soil, mut around) = (Around::nothing(), Around::nothing());
+        let mut count = 0;
+        for place in &group.places {
+            let place = place.as_ref();
+            let vertices = &draft.mesh.vertices;
+            let terrain = group.scene.terrain.filter(|_| place.is_none());
+            for face in self.casting(&draft.mesh.faces, place) {
+                let around = if Some(face.owner) == terrain { &mut soil } else { &mut around };
+                for (v, _) in face.corners {
+                    let at = vertices[v as usize];
+                    around.include(&place.map_or(at, |place| place.point(at)).coords);
+                }
+                count += 1;
+            }
+            for (ends, _) in draft.lines(place) {
+                ends.iter().for_each(|end| around.include(&end.coords));
+                count += 1;
+            }
+        }
+        Measured { draft, soil, around, count }
     }
 
     /// Passes everything on, a batch at a time.
@@ -304,7 +331,7 @@ mod tests {
         let mut survey = Survey::new(View::FRONT);
         survey.add(&scene);
         let fit = survey.fit();
-        let mut casters = Casters::new(&scene, &fit, 40.0, |_| 40.0, None, |_, _| true);
+        let mut casters = Casters::new(&scene, &fit, 160.0, |_| 160.0, None, |_, _| true, 1);
         let collect = |casters: &Casters| {
             let (mut all, mut most) = (Vec::new(), 0);
             casters.each_batch(|batch| {
@@ -322,12 +349,12 @@ mod tests {
         assert_eq!(collect(&casters).0, kept);
         // One mesh of all of them goes in parts, too.
         let flat = scene.flattened();
-        let whole = Casters::new(&flat, &fit, 40.0, |_| 40.0, None, |_, _| true);
+        let whole = Casters::new(&flat, &fit, 160.0, |_| 160.0, None, |_, _| true, 1);
         let (passed, most) = collect(&whole);
         assert_eq!(passed.len(), whole.count());
         assert!(passed.len() > BATCH && most < BATCH + BATCH / 8, "{} {most}", passed.len());
         // Far away, a plant is two triangles.
-        let far = Casters::new(&scene, &fit, 40.0, |_| 1e-3, None, |_, _| true);
+        let far = Casters::new(&scene, &fit, 40.0, |_| 1e-3, None, |_, _| true, 1);
         assert_eq!(far.count(), 6000);
     }
 }

@@ -161,24 +161,6 @@ impl<'s> Draft<'s> {
         self.thin.len()
     }
 
-    /// The middle and the radius of a ball around the ribbons of some thin stems.
-    pub(super) fn ball_around(&self, stems: Range<usize>) -> (Point, f64) {
-        let (mut low, mut high) = (Point::from([f64::INFINITY; 3]), Point::from([f64::NEG_INFINITY; 3]));
-        let mut widest = 0.0_f64;
-        for &i in &self.thin[stems] {
-            let segment = &self.scene.segments[i as usize];
-            for end in [segment.start, segment.end] {
-                (low, high) = (low.inf(&end), high.sup(&end));
-            }
-            widest = segment
-                .widths
-                .map(|width| width.resolve(self.default_width))
-                .into_iter()
-                .fold(widest, f64::max);
-        }
-        (nalgebra::center(&low, &high), (high - low).norm() / 2.0 + LONGEST * widest)
-    }
-
     /// Some of the thin stems as ribbons, each placed, facing the viewer.
     pub(super) fn ribbons<'d>(
         &'d self,

@@ -1,7 +1,5 @@
 //! A camera with the pixels of its picture: where points come to lie, how large things are there, and what is outside.
 
-use std::ops::Range;
-
 use super::{Camera, Fit};
 use crate::raster::{Corner, Place};
 use dlsys_geometry::scene::{Point, Vector};
@@ -107,18 +105,6 @@ impl Lens {
             true if nearest > 0.0 => nearest.clamp(middle, NEAREST * middle),
             true => NEAREST * middle,
             false => NEAREST * self.scale_at(centre - towards),
-        }
-    }
-
-    /// The rows of the picture that a ball may touch.
-    pub(super) fn rows(&self, centre: Point, radius: f64) -> Range<usize> {
-        let height = self.size[1];
-        match self.reach(centre, radius) {
-            None => 0..height,
-            Some(([_, y], reach)) => {
-                let row = |y: f64| y.clamp(0.0, height as f64) as usize;
-                row(y - reach)..(row(y + reach) + 1).min(height)
-            }
         }
     }
 

@@ -101,7 +101,7 @@ impl<'a> Lighting<'a> {
                 lens.is_none_or(|lens| !lens.misses(middle, NEIGHBOURHOOD * radius))
                     || lens.is_none_or(|lens| is_shadow_seen(lens, (middle, radius), sun, floor))
             };
-            let casters = Casters::new(scene, fit, scale.min(1500.0 / extent), seen, ground, counts);
+            let casters = Casters::new(scene, fit, scale.min(1500.0 / extent), seen, ground, counts, threads);
             let maps = (casters.count() > 0).then(|| Maps::new(&casters, sun, scale, fineness, threads))?;
             open_sky = floor.map(|height| OpenSky::new(&maps, casters.around(), height, fineness, threads));
             Some(maps)

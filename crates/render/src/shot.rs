@@ -1,8 +1,6 @@
 //! A picture in the making: the triangles of a [`Stage`] in pixels, and their colours in the light.
 
 use std::ops::Range;
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::draft::Draft;
 use super::lens::Lens;
@@ -11,11 +9,13 @@ use super::lighting::Lighting;
 use super::mapping::{Cut, Mapping, Pinned};
 use super::raster::{self, Image, Pattern, Place};
 use super::stage::{Part, Stage};
+use super::strips::Census;
+use super::threads::side_by_side;
 use super::veil::Veil;
 use dlsys_geometry::scene::{Color, Point, Texture, Vector};
 
-/// Most triangles that are in memory at a time: a picture with more is drawn in strips, if these have fewer.
-const MOST: usize = 3_000_000;
+/// Most triangles that are in memory at a time: a picture with more is drawn in strips.
+const MOST: usize = 6_000_000;
 /// Parts that are made side by side.
 const BLOCK: usize = 64;
 /// How far the edges of a ribbon are turned away, as those of a stem: sine and cosine.
@@ -60,6 +60,18 @@ pub(super) fn draw<const N: usize>(
     lens: &Lens,
     lighting: &Lighting,
 ) -> Image {
+    draw_within(MOST, pattern, threads, stage, lens, lighting)
+}
+
+/// The same with at most so many triangles in memory.
+pub(super) fn draw_within<const N: usize>(
+    most: usize,
+    pattern: &Pattern<N>,
+    threads: usize,
+    stage: &Stage,
+    lens: &Lens,
+    lighting: &Lighting,
+) -> Image {
     let [width, height] = lens.size;
     let mut pixels = vec![[0; 4]; width * height];
     let veil = lighting.haze().map(|haze| Veil::new(haze, lens));
@@ -69,98 +81,105 @@ pub(super) fn draw<const N: usize>(
         veil: veil.as_ref(),
         colors: &stage.colors,
         textures: &stage.textures,
-        rows: 0..0,
+        rows: 0..height,
         places: Vec::new(),
         pinned: Vec::new(),
         normals: Vec::new(),
         faces: Vec::new(),
         surface: 0,
     };
-    // Rows that are yet to be drawn, the next ones last.
-    let mut left: Vec<Range<usize>> = Vec::new();
-    left.push(0..height);
-    while let Some(rows) = left.pop() {
-        if !shot.fill(rows.clone(), stage, threads) {
-            let half = (rows.len() / 2).next_multiple_of(raster::BAND);
-            left.extend([rows.start + half..rows.end, rows.start..rows.start + half]);
-            continue;
-        }
+    let mut draw = |shot: &Shot| {
+        let rows = shot.rows.clone();
         let pixels = &mut pixels[rows.start * width..rows.end * width];
-        raster::draw(pattern, threads, lens.size, rows, &shot, pixels);
+        raster::draw(pattern, threads, lens.size, rows, shot, pixels);
+    };
+    let parts: Vec<&Part> = stage.parts.iter().collect();
+    match shot.fill(most, &parts, stage, threads) {
+        None => draw(&shot),
+        Some(census) => {
+            for rows in census.strips(most) {
+                let parts: Vec<&Part> = census.parts_in(&rows).map(|number| parts[number]).collect();
+                shot.rows = rows;
+                shot.fill(usize::MAX, &parts, stage, threads);
+                draw(&shot);
+            }
+        }
     }
     Image { width, height, pixels }
 }
 
-impl Shot<'_> {
-    /// All that is seen in some rows; false if that is too much, and there may be less in fewer rows.
-    fn fill(&mut self, rows: Range<usize>, stage: &Stage, threads: usize) -> bool {
-        let may_split = rows.len() > raster::BAND;
-        self.clear();
-        self.rows = rows;
-        self.add_floor();
-        let parts: Vec<&Part> = stage.parts.iter().filter(|part| part.touches(&self.rows)).collect();
-        for block in parts.chunks(BLOCK) {
-            if threads <= 1 || block.len() == 1 {
-                block.iter().for_each(|part| stage.with_draft(part, |draft| self.add(draft, part)));
-            } else {
-                self.add_block(block, stage, threads);
-            }
-            if may_split && self.faces.len() > MOST {
-                return false;
-            }
+impl<'a> Shot<'a> {
+    /// One with nothing in it.
+    fn emptied(&self) -> Shot<'a> {
+        Shot {
+            rows: self.rows.clone(),
+            places: Vec::new(),
+            pinned: Vec::new(),
+            normals: Vec::new(),
+            faces: Vec::new(),
+            surface: 0,
+            ..*self
         }
-        true
     }
 
-    /// Adds parts that several threads make, in their order.
-    fn add_block(&mut self, block: &[&Part], stage: &Stage, threads: usize) {
-        let made: Vec<OnceLock<Shot>> = block.iter().map(|_| OnceLock::new()).collect();
-        let next = AtomicUsize::new(0);
-        let Shot { lens, lighting, veil, colors, textures, ref rows, .. } = *self;
-        let make = || {
-            loop {
-                let number = next.fetch_add(1, Ordering::Relaxed);
-                let Some((part, place)) = block.get(number).zip(made.get(number)) else { return };
-                place.get_or_init(|| {
-                    let mut shot = Shot {
-                        lens,
-                        lighting,
-                        veil,
-                        colors,
-                        textures,
-                        rows: rows.clone(),
-                        places: Vec::new(),
-                        pinned: Vec::new(),
-                        normals: Vec::new(),
-                        faces: Vec::new(),
-                        surface: 0,
-                    };
-                    stage.with_draft(part, |draft| shot.add(draft, part));
-                    shot
-                });
+    /// All that is seen of these parts. If that is more than so many triangles, it is dropped, and all are counted instead.
+    fn fill(&mut self, most: usize, parts: &[&Part], stage: &Stage, threads: usize) -> Option<Census> {
+        self.clear();
+        self.add_floor();
+        let mut census = None;
+        // The ends of the parts so far.
+        let mut ends = vec![self.faces.len()];
+        for block in parts.chunks(BLOCK) {
+            self.add_block(block, stage, threads, &mut ends);
+            if census.is_none() && self.faces.len() <= most {
+                continue;
             }
-        };
-        std::thread::scope(|scope| {
-            (1..threads.min(block.len())).for_each(|_| drop(scope.spawn(make)));
-            make();
-        });
-        for shot in made.into_iter().filter_map(OnceLock::into_inner) {
-            let (vertex, normal, surface) =
-                (self.places.len() as u32, self.normals.len() as u32, self.surface);
-            self.places.extend_from_slice(&shot.places);
-            if !shot.pinned.is_empty() {
-                self.pinned.resize(vertex as usize, [0.0; 2]);
-                self.pinned.extend_from_slice(&shot.pinned);
+            let census = census.get_or_insert_with(|| Census::new(self.lens.size[1]));
+            for part in ends.windows(2) {
+                census.add_part((part[0]..part[1]).filter_map(|n| raster::rows_of(self, n, self.rows.end)));
             }
-            self.normals.extend_from_slice(&shot.normals);
-            self.faces.extend(shot.faces.iter().map(|face| Face {
-                corners: face.corners.map(|v| vertex + v),
-                normals: face.normals.map(|n| normal + n),
-                surface: surface + face.surface,
-                look: face.look,
-            }));
-            self.surface += shot.surface;
+            self.clear();
+            ends = vec![0];
         }
+        census
+    }
+
+    /// Adds parts, in their order, made by several threads, and where each ends.
+    fn add_block(&mut self, block: &[&Part], stage: &Stage, threads: usize, ends: &mut Vec<usize>) {
+        if threads <= 1 || block.len() == 1 {
+            for part in block {
+                stage.with_draft(part, |draft| self.add(draft, part));
+                ends.push(self.faces.len());
+            }
+            return;
+        }
+        let make = |number: usize| {
+            let (part, mut shot) = (block[number], self.emptied());
+            stage.with_draft(part, |draft| shot.add(draft, part));
+            shot
+        };
+        for shot in side_by_side(block.len(), threads, make) {
+            self.append(&shot);
+            ends.push(self.faces.len());
+        }
+    }
+
+    /// Adds all that is in another one.
+    fn append(&mut self, shot: &Shot) {
+        let (vertex, normal, surface) = (self.places.len() as u32, self.normals.len() as u32, self.surface);
+        self.places.extend_from_slice(&shot.places);
+        if !shot.pinned.is_empty() {
+            self.pinned.resize(vertex as usize, [0.0; 2]);
+            self.pinned.extend_from_slice(&shot.pinned);
+        }
+        self.normals.extend_from_slice(&shot.normals);
+        self.faces.extend(shot.faces.iter().map(|face| Face {
+            corners: face.corners.map(|v| vertex + v),
+            normals: face.normals.map(|n| normal + n),
+            surface: surface + face.surface,
+            look: face.look,
+        }));
+        self.surface += shot.surface;
     }
 
     fn clear(&mut self) {

@@ -113,6 +113,11 @@ pub(super) trait Triangles: Sync {
     fn shade(&self, n: usize, pixel: [usize; 2], weights: [f64; 3]) -> [u8; 4];
 }
 
+/// The first and the last row of those above `end` that may show some of a triangle.
+pub(super) fn rows_of(triangles: &impl Triangles, number: usize, end: usize) -> Option<[usize; 2]> {
+    range(triangles.corners(number).map(|corner| i64::from(corner.y)), end)
+}
+
 /// Draws triangles in some rows of a picture that is so wide and high. `pixels` are those of the rows.
 pub(super) fn draw<const N: usize>(
     pattern: &Pattern<N>,
@@ -125,8 +130,8 @@ pub(super) fn draw<const N: usize>(
     // Triangles that each band may show, in order.
     let mut bands: Vec<Vec<u32>> = vec![Vec::new(); rows.len().div_ceil(BAND)];
     for number in 0..triangles.count() {
-        let at = triangles.corners(number).map(|corner| i64::from(corner.y));
-        if let Some([first, last]) = range(at, rows.end.min(height)).filter(|[_, last]| *last >= rows.start) {
+        let of_picture = rows_of(triangles, number, rows.end.min(height));
+        if let Some([first, last]) = of_picture.filter(|[_, last]| *last >= rows.start) {
             let [first, last] = [first, last].map(|row| row.saturating_sub(rows.start) / BAND);
             let last = last.min(bands.len().saturating_sub(1));
             bands[first..=last].iter_mut().for_each(|band| band.push(number as u32));

@@ -8,11 +8,9 @@
 //! depths of a map ─distances from the floor─▶ layers of covered cells ─blurred, added─▶ Shade ─sum over the sky, on a grid─▶ OpenSky
 //! ```
 
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use super::{BIAS, Fineness, Map, Maps, SLOPE};
 use crate::casters::Reach;
+use crate::threads::side_by_side;
 use dlsys_geometry::scene::Vector;
 
 /// Layers by distance along the light, in cells: up to 2, 4, 8 and so on.
@@ -81,24 +79,6 @@ impl OpenSky {
         let part = line(row) * (1.0 - v) + line(row + 1) * v;
         1.0 - (1.0 - part) * rim.min(1.0)
     }
-}
-
-/// Makes so many values, on several threads; they do not depend on that.
-fn side_by_side<T: Send + Sync>(count: usize, threads: usize, make: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    let made: Vec<OnceLock<T>> = (0..count).map(|_| OnceLock::new()).collect();
-    let next = AtomicUsize::new(0);
-    let work = || {
-        loop {
-            let number = next.fetch_add(1, Ordering::Relaxed);
-            let Some(place) = made.get(number) else { return };
-            place.get_or_init(|| make(number));
-        }
-    };
-    std::thread::scope(|scope| {
-        (1..threads.min(count)).for_each(|_| drop(scope.spawn(work)));
-        work();
-    });
-    made.into_iter().filter_map(OnceLock::into_inner).collect()
 }
 
 /// The shadow on the floor in the light of one map, in its cells and some around them.
