@@ -172,6 +172,7 @@ impl FrameWriter {
             Content::Pixels => Cow::Borrowed(scene),
             Content::Vectors | Content::Mesh => scene.flattened(),
         };
+        let whole = self.fit.drawn(Cow::Borrowed(scene));
         let scene = match self.format.content() {
             Content::Pixels => self.fit.drawn(Cow::Borrowed(scene)),
             // Nor do regions of them.
@@ -187,7 +188,7 @@ impl FrameWriter {
             }
             Content::Vectors | Content::Mesh => self.fit.drawn(flattened.tessellated(self.fit.accuracy)),
         };
-        self.format.exporter().write(Drawing { scene: &scene, writer: self, title }, out)
+        self.format.exporter().write(Drawing { scene: &scene, whole: &whole, writer: self, title }, out)
     }
 
     /// The pixels of the PNG file of a frame, row by row from the top: red, green and blue, and the opacity if the page has no background.

@@ -38,6 +38,10 @@ pub(super) struct Style<'a> {
     pub(super) background: Option<Color>,
     /// The material of the floor.
     pub(super) floor: Option<MaterialId>,
+    /// What casts shadows, if it is not the scene that is drawn: that with its plants.
+    pub(super) casting: Option<&'a Scene>,
+    /// Threads that make shadows, at least 1.
+    pub(super) threads: usize,
     /// Memory that is kept from frame to frame.
     pub(super) memory: Option<&'a trace::Memory>,
 }

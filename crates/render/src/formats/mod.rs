@@ -45,6 +45,8 @@ pub struct Description {
 pub struct Drawing<'a> {
     /// The scene. Except for formats of pixels its surfaces are meshes of the accuracy that the format needs, and there are no patches.
     pub scene: &'a Scene,
+    /// The scene as it is, with its plants and curved surfaces: for the shadows that it casts.
+    pub whole: &'a Scene,
     /// Scale, page, and settings of meshes.
     pub writer: &'a FrameWriter,
     /// Its title for readers: the model and the time. May contain any characters.

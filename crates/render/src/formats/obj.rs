@@ -43,7 +43,7 @@ impl Exporter for Obj {
 
     fn write(
         &self,
-        Drawing { scene, writer, title }: Drawing<'_>,
+        Drawing { scene, writer, title, .. }: Drawing<'_>,
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
         let (scene, _) = floor::added(scene, &writer.fit, None);

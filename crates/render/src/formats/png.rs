@@ -31,7 +31,7 @@ impl Exporter for Png {
 
     fn write(
         &self,
-        Drawing { scene, writer, title }: Drawing<'_>,
+        Drawing { scene, writer, title, .. }: Drawing<'_>,
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
         let (fit, page) = writer.fit.for_frame(scene, &writer.page);
@@ -83,12 +83,12 @@ pub(crate) struct Lit<'m> {
 }
 
 impl<'m> Lit<'m> {
-    /// The triangles of a scene, whose floor has a material of its own. A point that the camera sees at x, y is at `a x + b` and
+    /// The triangles of a scene in this light, whose floor has a material of its own. A point that the camera sees at x, y is at `a x + b` and
     /// `c - a y` pixels.
     pub(crate) fn new(
         scene: &'m Scene,
         mesh: &'m Triangles,
-        fit: &'m Fit,
+        (fit, lighting): (&'m Fit, Lighting<'m>),
         [a, b, c]: [f64; 3],
         floor: Option<MaterialId>,
     ) -> Lit<'m> {
@@ -98,7 +98,7 @@ impl<'m> Lit<'m> {
         let normals = mesh.normals.iter().map(|&n| fit.camera.direction(n)).collect();
         Lit {
             mesh,
-            lighting: Lighting::new(scene, fit, a, 1, floor, None),
+            lighting,
             floor,
             places,
             snapped: Vec::new(),

@@ -21,7 +21,7 @@ impl Exporter for Svg {
 
     fn write(
         &self,
-        Drawing { scene, writer, title }: Drawing<'_>,
+        Drawing { scene, whole, writer, title }: Drawing<'_>,
         out: &mut (dyn Write + Send),
     ) -> io::Result<()> {
         let (mut fit, page) = writer.fit.for_frame(scene, &writer.page);
@@ -29,7 +29,8 @@ impl Exporter for Svg {
         fit.picture = page.picture;
         let sky = Sky::of(scene, &fit, &page);
         let (scene, floor) = floor::added(scene, &fit, Some(&page));
-        let style = Style { floor, memory: Some(&writer.memory), ..style(&fit, &page) };
+        let (casting, memory) = (Some(whole), Some(&*writer.memory));
+        let style = Style { floor, casting, threads: writer.threads, memory, ..style(&fit, &page) };
         let elements = painter::elements(&scene, style, true, "");
         let parts = around(&page, title, sky.as_ref(), elements);
         parts.iter().try_for_each(|part| out.write_all(part.as_bytes()))
@@ -39,7 +40,16 @@ impl Exporter for Svg {
 /// How frames are painted on a page.
 pub(crate) fn style<'a>(fit: &'a Fit, page: &Page) -> Style<'a> {
     let [pixels, ..] = page.placement();
-    Style { fit, scale: page.picture.scale, pixels, background: page.background, floor: None, memory: None }
+    Style {
+        fit,
+        scale: page.picture.scale,
+        pixels,
+        background: page.background,
+        floor: None,
+        casting: None,
+        threads: 1,
+        memory: None,
+    }
 }
 
 /// The document of a page with these elements, each with its line's end, in parts: elements are most of it, and are not copied. A sky stands in

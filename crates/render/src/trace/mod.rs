@@ -29,6 +29,8 @@ use std::fmt::Write;
 
 use super::Fit;
 use super::formats::png::Lit;
+use super::lens::Lens;
+use super::lighting::Lighting;
 use super::name::Names;
 use super::painter::Style;
 use super::stroke::{Stroke, Strokes, is_thin, pixels_across};
@@ -78,9 +80,13 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     // Cells in a pixel of the page.
     let per_pixel = (cell * style.pixels).powi(-2);
     let [a, b, c] = [1.0 / cell, -left / cell, (bottom + height) / cell];
-    let mut lit = Lit::new(scene, &mesh, style.fit, [a, b, c], style.floor);
+    let whole = [width, height].map(|side| (side / cell).ceil().max(1.0));
+    let lens = Lens::new(style.fit, whole.map(|side| side as u32), [a, b, c]);
+    let casting = style.casting.unwrap_or(scene);
+    let lighting = Lighting::new(casting, style.fit, a, style.threads, style.floor, Some(&lens));
+    let mut lit = Lit::new(scene, &mesh, (style.fit, lighting), [a, b, c], style.floor);
     // Of the raster only the part in which something is drawn.
-    let [low, size] = drawn(&mesh, &lit, [width, height].map(|side| (side / cell).ceil().max(1.0)));
+    let [low, size] = drawn(&mesh, &lit, whole);
     let placement = [a, b - low[0], c - low[1]];
     lit.shift(low);
     let size = size.map(|side| side as usize);
