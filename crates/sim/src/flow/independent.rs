@@ -241,6 +241,7 @@ impl FlowStage<'_, '_> {
         let settings = self.setup.settings.for_clocks(solve.has_hazard_clock);
         let stiff = control.stiff || self.setup.settings.method.is_implicit();
         let pulses = !solve.pulses.is_empty() && !fixed;
+        integrator.keep_reached(pulses);
         let least = 64.0 * from.resolution();
         let mut tries = 0;
         let step = loop {
@@ -266,6 +267,7 @@ impl FlowStage<'_, '_> {
                 end,
                 nodes,
                 own,
+                reached: integrator.reached(),
                 tolerance,
                 stiff,
                 sliced: self.setup.settings.is_sliced(),

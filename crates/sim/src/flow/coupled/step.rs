@@ -20,6 +20,7 @@ use crate::world::prefetch::prefetch;
 use crate::world::state::NextKind;
 use crate::{Method, Scheduler};
 use dlsys_model::Rule;
+use dlsys_ode::Reached;
 use dlsys_tree::{ModuleId, SimTime};
 
 /// Most times that a step is tried whose algebraic components cannot be followed, or whose rates may have pulses.
@@ -157,7 +158,15 @@ impl FlowStage<'_, '_> {
         let nodes = integrator.nodes();
         let overlooked = pulsing.iter().filter_map(|id| {
             let how = (settings.tolerance, stiff, settings.is_sliced());
-            let step = examined_step(self.world, &self.setup.model.rules, *id, from, &nodes, how)?;
+            let step = examined_step(
+                self.world,
+                &self.setup.model.rules,
+                *id,
+                from,
+                &nodes,
+                integrator.reached(),
+                how,
+            )?;
             match self.detector.pulses.examine(&step) {
                 PulseFinding::Clear => None,
                 PulseFinding::Overlooked(at) => Some(at),
@@ -328,7 +337,7 @@ impl FlowStage<'_, '_> {
         let (world, rules, pulses) = (&self.world, &self.setup.model.rules, &mut self.detector.pulses);
         let nodes = &*self.flows.coupled.reintegration.nodes();
         pulsing.into_iter().any(|id| {
-            let step = examined_step(world, rules, id, self.instant.at, nodes, how);
+            let step = examined_step(world, rules, id, self.instant.at, nodes, None, how);
             step.is_some_and(|step| pulses.examine(&step) != PulseFinding::Clear)
         })
     }
@@ -367,6 +376,7 @@ fn examined_step<'p>(
     id: ModuleId,
     start: SimTime,
     nodes: &'p [f64],
+    reached: Option<Reached<'p>>,
     (tolerance, stiff, sliced): (f64, bool, bool),
 ) -> Option<ExaminedStep<'p>> {
     let state = world.state(id)?;
@@ -382,6 +392,7 @@ fn examined_step<'p>(
         end,
         nodes,
         own: None,
+        reached,
         tolerance,
         stiff,
         sliced,
