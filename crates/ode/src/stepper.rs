@@ -113,8 +113,10 @@ pub struct Stepper {
 /// The range of each component among the states at which the rates were evaluated in a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Reached<'s> {
-    least: &'s [f64],
-    greatest: &'s [f64],
+    /// The least value of each component.
+    pub least: &'s [f64],
+    /// The greatest.
+    pub greatest: &'s [f64],
 }
 
 impl Reached<'_> {

@@ -24,6 +24,74 @@ use dlsys_ode::Reached;
 /// What the terms may differ by, times the length of the step, in tolerances: as much as the error of a step may be.
 const SHARE: f64 = 0.1;
 
+/// The range of integrated variables at the stages of a step, or of several end to end.
+#[derive(Clone, Copy)]
+pub struct StageRange<'p> {
+    pub reached: Reached<'p>,
+    /// By component of the coupled solution: its number in the step. Those that are not in the step, with a number beyond, are its inputs along their dense output. None if
+    /// they are numbered alike.
+    pub numbers: Option<&'p [u32]>,
+}
+
+/// The range of the components over steps end to end.
+#[derive(Clone, Default)]
+pub struct RangeOfSteps {
+    least: Vec<f64>,
+    greatest: Vec<f64>,
+    steps: usize,
+    is_known: bool,
+}
+
+impl RangeOfSteps {
+    /// Begins with the first of other steps.
+    pub fn begin(&mut self) {
+        (self.steps, self.is_known) = (0, true);
+    }
+
+    /// Includes a step, if its range is known.
+    pub fn add(&mut self, step: Option<Reached>) {
+        let Some(Reached { least, greatest }) = step else {
+            self.is_known = false;
+            return;
+        };
+        if self.steps == 0 {
+            self.least.clear();
+            self.greatest.clear();
+            self.least.extend_from_slice(least);
+            self.greatest.extend_from_slice(greatest);
+        }
+        self.least.iter_mut().zip(least).for_each(|(known, new)| *known = known.min(*new));
+        self.greatest.iter_mut().zip(greatest).for_each(|(known, new)| *known = known.max(*new));
+        self.steps += 1;
+    }
+
+    /// The range of all of them, if it is known.
+    pub fn stages<'r>(&'r self, numbers: &'r [u32]) -> Option<StageRange<'r>> {
+        let reached = Reached { least: &self.least, greatest: &self.greatest };
+        (self.is_known && self.steps > 0).then_some(StageRange { reached, numbers: Some(numbers) })
+    }
+}
+
+impl<'p> StageRange<'p> {
+    /// The range of a step whose components are numbered as they are known.
+    pub fn of_step(reached: Reached<'p>) -> StageRange<'p> {
+        StageRange { reached, numbers: None }
+    }
+
+    /// The range of a component whose dense output has these bounds.
+    fn with(&self, component: u32, bounds: Interval) -> Smooth {
+        let number = match self.numbers {
+            Some(numbers) => numbers.get(component as usize).copied().unwrap_or(u32::MAX),
+            None => component,
+        };
+        match self.reached.of(number as usize) {
+            Some((lo, hi)) => Smooth::spanned(bounds.lo.min(lo), bounds.hi.max(hi)),
+            None if self.numbers.is_some() => Smooth::spanned(bounds.lo, bounds.hi),
+            None => Smooth::UNKNOWN,
+        }
+    }
+}
+
 /// Tests steps; the fields are working memory.
 #[derive(Clone, Debug, Default)]
 pub struct CalmTest {
@@ -40,8 +108,8 @@ impl CalmTest {
         if step.sliced || has_values || !step.rule.aggregates.is_empty() {
             return false;
         }
-        let Some(reached) = step.reached else { return false };
-        self.gather(step, reached);
+        let Some(stages) = step.stages else { return false };
+        self.gather(step, stages);
         let h = step.end.since(step.start);
         let formulas = step.state.numeric_only.then_some(&pulses.formula_rates);
         std::iter::once(&pulses.rates).chain(formulas).all(|all| {
@@ -53,7 +121,7 @@ impl CalmTest {
     }
 
     /// The box of all variables.
-    fn gather(&mut self, step: &ExaminedStep, reached: Reached) {
+    fn gather(&mut self, step: &ExaminedStep, stages: StageRange) {
         let (world, variables) = (step.world, &mut self.variables);
         variables.clear();
         for &id in std::iter::once(&step.state.id).chain(step.state.context.context()) {
@@ -61,7 +129,7 @@ impl CalmTest {
             match world.state(id).filter(|state| !state.trajectories.is_empty()) {
                 Some(state) => variables.extend(
                     (values.iter().zip(&state.trajectories))
-                        .map(|(x, trajectory)| range(step, reached, state, trajectory, *x)),
+                        .map(|(x, trajectory)| range(step, stages, state, trajectory, *x)),
                 ),
                 None => variables.extend(values.iter().map(|x| Smooth::constant(*x))),
             }
@@ -77,19 +145,15 @@ impl CalmTest {
 
 /// The range of a parameter over a step and its stages.
 #[inline]
-fn range(step: &ExaminedStep, reached: Reached, state: &State, trajectory: &Trajectory, x: f64) -> Smooth {
-    let among_stages = |component: u32, bounds: Interval| {
-        let Some((lo, hi)) = reached.of(component as usize) else { return Smooth::UNKNOWN };
-        Smooth::spanned(bounds.lo.min(lo), bounds.hi.max(hi))
-    };
+fn range(step: &ExaminedStep, stages: StageRange, state: &State, trajectory: &Trajectory, x: f64) -> Smooth {
     match (trajectory, step.own) {
         (Trajectory::Rest, _) => Smooth::constant(x),
         (Trajectory::Step(c), Some(dense)) if state.id == step.state.id => {
-            among_stages(*c, dense.bounds(*c as usize))
+            stages.with(*c, dense.bounds(*c as usize))
         }
         (Trajectory::Coupled(c), None) => {
             let hull = (step.world.coupled.as_ref()).and_then(|all| all.hull(*c as usize, step.start));
-            hull.map_or(Smooth::UNKNOWN, |bounds| among_stages(*c, bounds))
+            hull.map_or(Smooth::UNKNOWN, |bounds| stages.with(*c, bounds))
         }
         (Trajectory::Polynomial(_), _) => {
             let [from, to] = [step.start, step.end].map(|at| at.since(state.since));

@@ -28,7 +28,7 @@
 
 use smallvec::SmallVec;
 
-use crate::detect::calm::CalmTest;
+use crate::detect::calm::{CalmTest, StageRange};
 use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::course::Course;
@@ -36,7 +36,7 @@ use crate::world::path::Path;
 use crate::world::state::State;
 use dlsys_expr::{Dual, Held, Interval, Program, Scratch};
 use dlsys_model::{PulseTerms, Rule, Solve};
-use dlsys_ode::{Dense, Reached};
+use dlsys_ode::Dense;
 use dlsys_tree::{ModuleId, SimTime};
 
 /// A pulse may be overlooked where the bounds of a term go beyond its range at the stages by this many times that range; in stiff equations, where they are
@@ -98,7 +98,7 @@ pub struct ExaminedStep<'p> {
     /// The dense output, if the module is integrated alone; else it is that of the coupled modules.
     pub own: Option<&'p Dense>,
     /// The range of the components at the stages, if it is known.
-    pub reached: Option<Reached<'p>>,
+    pub stages: Option<StageRange<'p>>,
     /// The largest contribution to the values that may be overlooked.
     pub tolerance: f64,
     /// The equations are stiff.

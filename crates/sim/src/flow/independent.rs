@@ -1,6 +1,7 @@
 //! Independent modules: those that read no integrated neighbour are integrated alone, each with steps of its own.
 
 use crate::detect::Detector;
+use crate::detect::calm::StageRange;
 use crate::detect::pulse::{ExaminedStep, MAX_UNBOUNDED, PulseFinding};
 use crate::error::Error;
 use crate::flow::FlowStage;
@@ -267,7 +268,7 @@ impl FlowStage<'_, '_> {
                 end,
                 nodes,
                 own,
-                reached: integrator.reached(),
+                stages: integrator.reached().map(StageRange::of_step),
                 tolerance,
                 stiff,
                 sliced: self.setup.settings.is_sliced(),
