@@ -1,6 +1,6 @@
 //! Pulses: rates and values that are large for less than a step, wherever they stand. None is passed over, or integrated in part.
 
-use dlsys::sim::{Method, Settings};
+use dlsys::sim::{Method, Scheduler, Settings};
 
 use crate::common::run;
 use crate::evidence::{first_event, last_value};
@@ -254,5 +254,28 @@ fn no_pulse_of_many_is_integrated_by_chance() {
         let exact = periods * 2.0 * std::f64::consts::PI * (-20f64).exp() * bessel.1;
         let y = last_value(&text, periods * 2.0 * std::f64::consts::PI / rate);
         assert!((y - exact).abs() < 1e-4 * exact, "{y}, not {exact}, of\n{text}");
+    }
+}
+
+/// A pulse in the rates of all cells of a filament in which cells have events all the time, so that some of them are integrated again around each.
+#[test]
+fn pulses_after_events_of_neighbours_are_seen() {
+    for n in 0..12 {
+        let at = 2.0 + (n as f64 * 0.0873) % 0.7;
+        let cells: String = (0..60).map(|i| format!(" F_v({:?}, 1)", (i as f64 * 0.618) % 1.0)).collect();
+        let text = format!(
+            "initial string: F_w(0, 2){cells} F_w(0, 2)\n\
+             F(u, l) < F_v(x, c) > F(v, r):\n  \
+               if x < 1 solve dx/dt = 1, dc/dt = 0.03*(l + r - 2c) + 0.1*sin(c) + 20*exp(-((t - {at:?})/0.002)^2)\n  \
+               if x = 1 produce F_v(0, 0.5*c + 0.4)"
+        );
+        let end = |scheduler, tolerance| {
+            let settings = Settings { scheduler, tolerance, ..Settings::default() };
+            run(&text, settings, &[3.0]).unwrap_or_else(|e| panic!("{e}\n{text}")).remove(0)
+        };
+        let (found, reference) = (end(Scheduler::Auto, 1e-6), end(Scheduler::Global, 1e-8));
+        for (a, b) in found.iter().zip(&reference) {
+            assert!((a.1[1] - b.1[1]).abs() < 2e-5, "{a:?}, not {b:?}, at {at}\n{text}");
+        }
     }
 }

@@ -9,7 +9,7 @@
 //!   folded, and every operand stands before its user, so passes are loops, never recursion.
 //! - [`Program`] is straight-line code for a few roots of a graph.
 //! - [`Value`] is what a program computes with. One interpreter serves them all: `f64` for states,
-//!   [`Interval`] for bounds over a stretch of time, [`Dual`] for derivatives along a trajectory.
+//!   [`Interval`] for bounds over a stretch of time, [`Dual`] for derivatives along a trajectory, [`Smooth`] for the distance from polynomials.
 //!
 //! ```
 //! use dlsys_expr::{Binary, Graph, Program};
@@ -38,6 +38,7 @@ mod ops;
 mod polynomial;
 mod program;
 mod sign;
+mod smooth;
 #[cfg(test)]
 mod tests;
 mod time;
@@ -56,4 +57,5 @@ pub use ops::{Binary, Unary, Value};
 pub use polynomial::{Monomial, Polynomial};
 pub use program::{LANES, Lanes, Program, Scratch};
 pub use sign::Sign;
+pub use smooth::Smooth;
 pub use time::SimTime;

@@ -35,5 +35,5 @@ pub use one_step::{InteriorError, Nodes, OneStep, Step, Trial};
 pub use rates::Rates;
 pub use roots::{Function, Root, first_root};
 pub use sparse::{Complex, Field, Pattern, Wide};
-pub use stepper::Stepper;
+pub use stepper::{Reached, Stepper};
 pub use workspace::Workspace;

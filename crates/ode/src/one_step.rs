@@ -63,6 +63,9 @@ pub trait OneStep {
     /// ([`OneStep::interior_error`]) where events are searched for.
     const INTERIOR_IS_MEASURED: bool = false;
 
+    /// True if the workspace knows the range of the states at the stages ([`Stepper::reached`](crate::Stepper::reached)).
+    const STAGES_ARE_KEPT: bool = false;
+
     /// Prepares for steps with a tolerance (that of a single step): a family of methods chooses its member.
     fn prepare(&mut self, _tolerance: f64) {}
 

@@ -93,6 +93,8 @@ pub struct Stepper {
     pub overhead_is_high: bool,
     /// Nothing is searched for inside steps, so that their interior need not be as exact as their ends; see [`Stepper::refined`].
     pub is_unwatched: bool,
+    /// The range of the components at the stages is kept: [`Stepper::reached`].
+    pub reached_is_kept: bool,
     /// So many components may err by more than is tolerated in a step, if the method tells the errors of single ones: those that
     /// the caller integrates again, [`Stepper::rough`].
     pub spared: usize,
@@ -106,6 +108,22 @@ pub struct Stepper {
     noisy: bool,
     steps: u64,
     rejected: u64,
+}
+
+/// The range of each component among the states at which the rates were evaluated in a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Reached<'s> {
+    /// The least value of each component.
+    pub least: &'s [f64],
+    /// The greatest.
+    pub greatest: &'s [f64],
+}
+
+impl Reached<'_> {
+    /// The least and the greatest value of a component; None if there is no such component.
+    pub fn of(&self, component: usize) -> Option<(f64, f64)> {
+        Some((*self.least.get(component)?, *self.greatest.get(component)?))
+    }
 }
 
 /// The tries of one step.
@@ -171,6 +189,13 @@ impl Stepper {
         (self.steps, self.rejected)
     }
 
+    /// The range of the components in the step just made; None for methods that do not tell, or if it is not kept.
+    pub fn reached(&self) -> Option<Reached<'_>> {
+        let is_known = self.work.reached_is_kept && self.scheme().facts().stages_are_kept;
+        let [least, greatest] = self.work.reached.each_ref();
+        is_known.then(|| Reached { least: &least[..self.size()], greatest: &greatest[..self.size()] })
+    }
+
     /// Number of components.
     pub fn size(&self) -> usize {
         self.work.end.len()
@@ -204,6 +229,7 @@ impl Stepper {
         self.scheme = Some(scheme);
         self.has_been_implicit |= facts.is_implicit;
         self.schemes.prepare(scheme, tolerance);
+        self.work.keep_reached(self.reached_is_kept);
         if !self.rate_is_known {
             self.work.start(system, y).map_err(Error::RateNotFinite)?;
             self.rate_is_known = true;
@@ -366,11 +392,11 @@ impl Stepper {
         let (h, is_implicit) = (step.h, tries.scheme.facts().is_implicit);
         let (inside, output) = self.look_inside(tries.scheme, system, step);
         let most = if is_implicit { MANY_PERIODS } else { MANY_REJECTIONS };
-        let fit = (INTERIOR * tries.outer / inside.absolute).powf(1.0 / (f64::from(tries.order) + 1.0));
+        let fit = || (INTERIOR * tries.outer / inside.absolute).powf(1.0 / (f64::from(tries.order) + 1.0));
         if inside.absolute > INTERIOR * tries.outer && tries.interior_rejections < most {
             self.rejected += 1;
             tries.interior_rejections += 1;
-            return Verdict::Again(h * fit.clamp(0.3, 0.9));
+            return Verdict::Again(h * fit().clamp(0.3, 0.9));
         }
         // Only of a step that is taken: a rejected one leaves nothing behind.
         self.output = output;
@@ -379,7 +405,7 @@ impl Stepper {
             let most = if tries.failed || rounding > 0.5 { 1.0 } else { 10.0 };
             let mut next = h * growth(error, control.last_error, tries.order).clamp(0.2, most);
             if is_implicit {
-                next = next.min(h * (SAFETY * fit).max(0.2));
+                next = next.min(h * (SAFETY * fit()).max(0.2));
             }
             // A step that had to end early says nothing against longer ones.
             control.size = if 2.0 * h > tries.room { next.max(control.size) } else { next };

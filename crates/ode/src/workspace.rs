@@ -35,6 +35,9 @@ pub struct Workspace {
     pub(crate) other_end: Vec<f64>,
     /// The state at the end of the step.
     pub(crate) end: Vec<f64>,
+    /// The least and the greatest values of the components at the stages of the step just tried, where these are kept.
+    pub(crate) reached: [Vec<f64>; 2],
+    pub(crate) reached_is_kept: bool,
     /// The error of each rate by rounding of the state; empty unless noise was measured.
     pub(crate) noise: Vec<f64>,
     /// The resolution of time at the start of the step if rates depend on time, otherwise 0.
@@ -62,6 +65,32 @@ impl Workspace {
         self.stage.resize(places, 0.0);
         self.other_end.resize(n, 0.0);
         self.end.resize(n, 0.0);
+    }
+
+    /// Keeps the range of the components at the stages, or does not.
+    pub(crate) fn keep_reached(&mut self, is_kept: bool) {
+        self.reached_is_kept = is_kept;
+        if is_kept {
+            let places = self.stage.len();
+            self.reached.iter_mut().for_each(|values| values.resize(places, 0.0));
+        }
+    }
+
+    /// Includes the state of a stage in the range; the first stage begins a new one.
+    pub(crate) fn reach(&mut self, is_first: bool) {
+        if !self.reached_is_kept {
+            return;
+        }
+        let n = self.end.len();
+        let [least, greatest] = self.reached.each_mut().map(|values| &mut values[..n]);
+        if is_first {
+            least.copy_from_slice(&self.from[..n]);
+            greatest.copy_from_slice(&self.from[..n]);
+        }
+        for ((least, greatest), value) in least.iter_mut().zip(greatest).zip(&self.stage) {
+            *least = least.min(*value);
+            *greatest = greatest.max(*value);
+        }
     }
 
     /// Evaluates the rates at the state `self.stage`, for a stage.

@@ -16,6 +16,11 @@ impl Pair for Dopri5 {
     const STABILITY: f64 = 2.8;
 
     fn dense(y: &[f64], end: &[f64], k: &[Vec<f64>], first: usize, h: f64, out: &mut Vec<f64>) {
+        if let ([y], [end]) = (y, end) {
+            // Alone, as most modules that are integrated on their own.
+            let hk = std::array::from_fn(|stage| [h * k[stage][first]]);
+            return out.extend_from_slice(dopri5_dense(&[*y], &[*end], &hk).as_flattened());
+        }
         let (mut from, mut to) = ([0.0; PART], [0.0; PART]);
         from[..y.len()].copy_from_slice(y);
         to[..y.len()].copy_from_slice(end);

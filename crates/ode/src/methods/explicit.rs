@@ -86,6 +86,7 @@ impl<P> Default for Explicit<P> {
 
 impl<P: Pair> OneStep for Explicit<P> {
     const INTERIOR_IS_MEASURED: bool = P::INTERIOR_IS_MEASURED;
+    const STAGES_ARE_KEPT: bool = true;
 
     fn error_order(&self) -> u32 {
         P::TABLEAU.error_order
@@ -127,6 +128,7 @@ impl<P: Pair> OneStep for Explicit<P> {
         work.from[..y.len()].copy_from_slice(y);
         for i in tableau.stages..tableau.a.len() {
             work.combine_for::<P>(i, y.len(), h);
+            work.reach(false);
             work.evaluate(system, tableau.c[i] * h, i);
         }
         let mut c = Vec::with_capacity(y.len() * (P::DEGREE + 1));
@@ -222,6 +224,7 @@ impl Workspace {
         self.from[..n].copy_from_slice(y);
         for i in 1..tableau.stages {
             self.combine_for::<P>(i, n, h);
+            self.reach(i == 1);
             self.evaluate(system, tableau.c[i] * h, i);
             if i + 2 == tableau.stages {
                 self.other_end.copy_from_slice(&self.stage[..n]);

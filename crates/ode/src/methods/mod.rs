@@ -61,6 +61,7 @@ macro_rules! methods {
                         is_implicit: matches!(Kind::$kind, Kind::Implicit),
                         tolerance_share: <$type>::TOLERANCE_SHARE,
                         interior_is_measured: <$type>::INTERIOR_IS_MEASURED,
+                        stages_are_kept: <$type>::STAGES_ARE_KEPT,
                     },)*
                 }
             }
@@ -192,6 +193,7 @@ pub(crate) struct Facts {
     pub is_implicit: bool,
     pub tolerance_share: f64,
     pub interior_is_measured: bool,
+    pub stages_are_kept: bool,
 }
 
 impl Method {

@@ -1,6 +1,8 @@
 //! Orders of methods and of their dense outputs; the measured error of interpolation.
 
 use super::*;
+use crate::control::{Control, StepSettings};
+use crate::stepper::Stepper;
 use crate::workspace::Workspace;
 
 /// y' = y cos(t), y(0) = 1: y = exp(sin t).
@@ -150,4 +152,59 @@ fn a_component_that_is_spared_does_not_shorten_the_step() {
         let exact = 1.0 + (-system.0[i] * long).exp();
         assert!((end[i] - exact).abs() < 1e-8, "{} for {exact}", end[i]);
     }
+}
+
+/// The rates of [`Growth`] with the range of the states at which they were asked for.
+struct Recorded {
+    growth: Growth,
+    range: (f64, f64),
+}
+
+impl Rates for Recorded {
+    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+        self.range = (self.range.0.min(y[0]), self.range.1.max(y[0]));
+        self.growth.rates(tau, y, out);
+    }
+
+    fn couplings(&self) -> Vec<(u32, u32)> {
+        self.growth.couplings()
+    }
+
+    fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>) {
+        self.growth.partials(tau, y, out);
+    }
+
+    fn modules(&self) -> u64 {
+        1
+    }
+}
+
+#[test]
+fn the_range_of_a_step_is_that_of_the_states_at_its_stages() {
+    for method in [Method::Dopri5, Method::Dop853] {
+        let mut system = Recorded { growth: Growth { t: 0.0 }, range: (1.0, 1.0) };
+        let settings = StepSettings { method, tolerance: 1e-9, step_size: 0.1 };
+        let mut stepper = Stepper::default();
+        stepper.restart(method, 1);
+        let mut control = Control { size: 1e-2, ..Control::default() };
+        let start = stepper.step(&settings, &mut control, &mut system, &[1.0], SimTime::ZERO, None);
+        assert!(start.is_ok() && stepper.reached().is_none(), "it is kept only where that is asked for");
+        stepper.reached_is_kept = true;
+        stepper.restart(method, 1);
+        system.range = (1.0, 1.0);
+        stepper.step(&settings, &mut control, &mut system, &[1.0], SimTime::ZERO, None).expect("a step");
+        stepper.dense(&mut system, &[1.0]);
+        assert_eq!(stepper.counts().1, 0, "no step was rejected");
+        let (least, greatest) = stepper.reached().and_then(|reached| reached.of(0)).expect("it is kept");
+        // The defect of the dense output is measured at a place of its own, which is on that.
+        assert_eq!(least, 1.0);
+        assert!(greatest > 1.0 && greatest >= system.range.1 - 1e-12, "{greatest}, {:?}", system.range);
+    }
+    let mut implicit = Stepper::default();
+    implicit.reached_is_kept = true;
+    implicit.restart(Method::Radau, 1);
+    let settings = StepSettings { method: Method::Radau, tolerance: 1e-6, step_size: 0.1 };
+    let mut system = Growth { t: 0.0 };
+    let step = implicit.step(&settings, &mut Control::default(), &mut system, &[1.0], SimTime::ZERO, None);
+    assert!(step.is_ok() && implicit.reached().is_none());
 }

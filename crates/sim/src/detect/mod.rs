@@ -4,9 +4,10 @@
 //! - [`crossing`]: the crossings of one atom, by formula or by root isolation
 //! - [`doubt`]: crossings that the error of integration may hide or feign
 //! - [`quiet`]: a short test that spares most searches
-//! - [`pulse`]: rates that are large between the stages of a step
+//! - [`pulse`]: rates that are large between the stages of a step; [`calm`]: a short test that spares most of that
 //! - [`signs`]: signs of the differences that conditions compare, and their consequences
 
+pub mod calm;
 pub mod crossing;
 pub mod doubt;
 pub mod pulse;

@@ -28,8 +28,10 @@
 
 use smallvec::SmallVec;
 
+use crate::detect::calm::{CalmTest, StageRange};
 use crate::trajectory::Trajectory;
 use crate::world::World;
+use crate::world::course::Course;
 use crate::world::path::Path;
 use crate::world::state::State;
 use dlsys_expr::{Dual, Held, Interval, Program, Scratch};
@@ -95,6 +97,8 @@ pub struct ExaminedStep<'p> {
     pub nodes: &'p [f64],
     /// The dense output, if the module is integrated alone; else it is that of the coupled modules.
     pub own: Option<&'p Dense>,
+    /// The range of the components at the stages, if it is known.
+    pub stages: Option<StageRange<'p>>,
     /// The largest contribution to the values that may be overlooked.
     pub tolerance: f64,
     /// The equations are stiff.
@@ -103,7 +107,11 @@ pub struct ExaminedStep<'p> {
     pub sliced: bool,
 }
 
-impl ExaminedStep<'_> {
+impl<'p> ExaminedStep<'p> {
+    fn course(&self) -> Course<'p> {
+        Course::new(self.world, self.state, self.rule, self.own)
+    }
+
     /// True if a value, or a rate times the length of the step, differs from that of the dense output by more than it does where all is smooth.
     fn is_far(&self, a: f64, b: f64, size: f64) -> bool {
         exceeds((a - b).abs(), DEFECT * self.tolerance * size.abs().max(1.0))
@@ -112,19 +120,21 @@ impl ExaminedStep<'_> {
 
 /// A step of a module that reads another one, and the first variable of that one in its equations.
 #[derive(Clone, Copy)]
-struct Reader<'r> {
-    step: &'r ExaminedStep<'r>,
+struct Reader<'r, 'p> {
+    step: &'r ExaminedStep<'p>,
+    course: &'r Course<'p>,
     offset: usize,
 }
 
 /// Terms of a step that are examined.
-struct Examination<'e> {
-    step: &'e ExaminedStep<'e>,
+struct Examination<'e, 'p> {
+    step: &'e ExaminedStep<'p>,
+    course: &'e Course<'p>,
     terms: &'e PulseTerms,
     /// An expression that lasts for the whole step contributes so many times its size to the values.
     scale: f64,
     /// The step whose values count, if not those of the module itself.
-    reader: Option<Reader<'e>>,
+    reader: Option<Reader<'e, 'p>>,
 }
 
 /// The positions of a step at which the ranges of terms have been sampled.
@@ -139,6 +149,7 @@ enum Sampled {
 /// Bounds rates along steps. The fields are working memory.
 #[derive(Clone, Debug, Default)]
 pub struct PulseDetector {
+    calm: CalmTest,
     /// The range of each term at the positions that have been sampled.
     ranges: Vec<Interval>,
     sampled: Sampled,
@@ -161,20 +172,25 @@ impl PulseDetector {
     /// Bounds the terms of the module's equations, and of its values that are solved for, along a step, and compares them
     /// with their values at the stages.
     pub fn examine(&mut self, step: &ExaminedStep) -> PulseFinding {
+        if self.calm.is_calm(step) {
+            return PulseFinding::Clear;
+        }
         let (all, pulses) = (step.end.since(step.start), &step.solve.pulses);
         let formulas = if step.state.numeric_only { Some((&pulses.formula_rates, all)) } else { None };
         let own = [(&pulses.rates, all)].into_iter().chain(formulas).chain([(&pulses.values, 1.0)]);
+        let course = &step.course();
         let mut first = PulseFinding::Clear;
         for (terms, scale) in own {
-            first = first.earlier(self.examine_terms(&Examination { step, terms, scale, reader: None }));
+            first =
+                first.earlier(self.examine_terms(&Examination { step, course, terms, scale, reader: None }));
         }
         if first == PulseFinding::Clear && !step.stiff && !step.sliced {
-            first = along(step, |path, _| self.examine_between(step, path));
+            first = along(step, |path, _| self.examine_between(step, course, path));
         }
         let mut offset = step.world.tree.parameters(step.state.id).len();
         for (n, id) in step.state.context.iter().enumerate() {
             // The variables of children are gathered, and stand nowhere.
-            let reader = (n < step.state.context.context().len()).then_some(Reader { step, offset });
+            let reader = (n < step.state.context.context().len()).then_some(Reader { step, course, offset });
             first = first.earlier(self.examine_formulas(step, *id, reader));
             offset += step.world.tree.parameters(*id).len();
         }
@@ -183,46 +199,43 @@ impl PulseDetector {
 
     /// Compares the rates of the module's equations, and its values, with those of the dense output between the stages. The two formulas of a step, from
     /// which its error is estimated, may agree by chance though a stage has met a pulse: on one of some hundred steps over one.
-    fn examine_between(&mut self, step: &ExaminedStep, path: &Path) -> PulseFinding {
+    fn examine_between(&mut self, step: &ExaminedStep, course: &Course, path: &Path) -> PulseFinding {
         let has_values = step.solve.pulses.values.terms.outputs() > 0;
         // A value that a stage has met need not be that of the dense output.
         let stages = if has_values { step.nodes } else { &[] };
         for position in BETWEEN.iter().chain(stages) {
-            let rest = (path.start.after(position * path.h), (1.0 - position) * path.h);
-            let path = Path::of_equations(step.world, step.state, step.rule, rest, step.own);
-            path.everything_at(0.0, &mut self.values);
-            let is_far = BETWEEN.contains(position) && self.rates_are_far(step, &path);
-            if is_far || has_values && self.values_are_far(step, &path) {
+            let at = path.start.after(position * path.h);
+            course.at(at, &mut self.values);
+            let is_far = BETWEEN.contains(position) && self.rates_are_far(step, course, at);
+            if is_far || has_values && self.values_are_far(step, course, at) {
                 return PulseFinding::Overlooked(0.0);
             }
         }
         PulseFinding::Clear
     }
 
-    /// True if rates at the start of a path are not those of the dense output. The variables there are in `values`.
-    fn rates_are_far(&mut self, step: &ExaminedStep, path: &Path) -> bool {
+    /// True if rates at an instant are not those of the dense output. The variables then are in `values`.
+    fn rates_are_far(&mut self, step: &ExaminedStep, course: &Course, at: SimTime) -> bool {
         let (solve, all) = (step.solve, step.end.since(step.start));
         let rates = if step.state.numeric_only { &solve.rates } else { &solve.numeric_rates };
         self.out.resize(rates.outputs(), 0.0);
         rates.eval(&self.values, &mut self.scratch, &mut self.out);
         self.out.iter().enumerate().any(|(number, rate)| {
             let parameter = solve.of[if step.state.numeric_only { number } else { solve.numeric[number] }];
-            path.dense_component(parameter).is_some_and(|along| {
-                let Dual { value, rate: of_dense } = along.departure();
-                step.is_far(rate * all, of_dense / path.h * all, value)
-            })
+            course
+                .departure(parameter, at)
+                .is_some_and(|Dual { value, rate: of_dense }| step.is_far(rate * all, of_dense * all, value))
         })
     }
 
-    /// True if values at the start of a path are not those of the dense output. The variables there are in `values`.
-    fn values_are_far(&mut self, step: &ExaminedStep, path: &Path) -> bool {
+    /// True if values at an instant are not those of the dense output. The variables then are in `values`.
+    fn values_are_far(&mut self, step: &ExaminedStep, course: &Course, at: SimTime) -> bool {
         let terms = &step.solve.pulses.values;
         self.values.resize(self.values.len() + terms.terms.outputs(), 0.0);
         self.out.resize(terms.disturbed.outputs(), 0.0);
         terms.disturbed.eval(&self.values, &mut self.scratch, &mut self.out);
         terms.parameters.iter().zip(&self.out).enumerate().any(|(number, (parameter, value))| {
-            path.dense_component(*parameter).is_some_and(|along| {
-                let of_dense = along.value(0.0);
+            course.departure(*parameter, at).is_some_and(|Dual { value: of_dense, .. }| {
                 let expected = if number < terms.explicit { of_dense } else { 0.0 };
                 step.is_far(*value, expected, of_dense)
             })
@@ -230,11 +243,11 @@ impl PulseDetector {
     }
 
     /// Examines the terms of the values of another module that follow formulas.
-    fn examine_formulas(
+    fn examine_formulas<'p>(
         &mut self,
-        step: &ExaminedStep,
+        step: &ExaminedStep<'p>,
         id: ModuleId,
-        reader: Option<Reader>,
+        reader: Option<Reader<'_, 'p>>,
     ) -> PulseFinding {
         let Some(state) = step.world.state(id) else { return PulseFinding::Clear };
         let Some((rule, solve)) = state.rule.zip(state.solve) else { return PulseFinding::Clear };
@@ -247,7 +260,8 @@ impl PulseDetector {
         }
         let scale = step.end.since(step.start);
         let other = ExaminedStep { state, rule, solve, own: None, ..*step };
-        self.examine_terms(&Examination { step: &other, terms, scale, reader })
+        let course = &other.course();
+        self.examine_terms(&Examination { step: &other, course, terms, scale, reader })
     }
 
     /// Bounds terms along a step and compares each with its values at the stages.
@@ -272,9 +286,7 @@ impl PulseDetector {
         self.out.resize(program.outputs(), 0.0);
         let nodes = if up_to == Sampled::Ends { &[0.0, 1.0][..] } else { step.nodes };
         for node in nodes {
-            let at = (step.start.after(node * h), 0.0);
-            let path = Path::of_equations(step.world, step.state, step.rule, at, step.own);
-            path.everything_at(0.0, &mut self.values);
+            all.course.at(step.start.after(node * h), &mut self.values);
             program.eval(&self.values, &mut self.scratch, &mut self.out);
             for (range, value) in self.ranges.iter_mut().zip(&self.out) {
                 let known = !range.is_empty();
@@ -362,7 +374,8 @@ impl PulseDetector {
     /// The change of values over the whole step if a term were larger by `more` than it is at a position of a path.
     fn effect(&mut self, all: &Examination, path: &Path, position: f64, term: usize, more: f64) -> f64 {
         let (terms, program) = (all.terms, &all.terms.disturbed);
-        path.everything_at(position, &mut self.values);
+        let at = path.start.after(position * path.h);
+        all.course.at(at, &mut self.values);
         let first = self.values.len();
         self.values.resize(first + terms.terms.outputs(), 0.0);
         self.out.resize(program.outputs(), 0.0);
@@ -370,17 +383,10 @@ impl PulseDetector {
         program.eval(&self.values, &mut self.scratch, &mut self.out);
         self.values[first + term] = more;
         program.eval(&self.values, &mut self.scratch, &mut self.changed);
-        let Some(Reader { step, offset }) = all.reader else {
+        let Some(Reader { step, course, offset }) = all.reader else {
             return all.scale * largest_difference(&self.changed, &self.out);
         };
-        let path = Path::of_equations(
-            step.world,
-            step.state,
-            step.rule,
-            (path.start.after(position * path.h), 0.0),
-            step.own,
-        );
-        path.everything_at(0.0, &mut self.values);
+        course.at(at, &mut self.values);
         let changes: SmallVec<[(usize, f64); 4]> =
             (terms.parameters.iter().zip(self.changed.iter().zip(&self.out)))
                 .map(|(parameter, (after, before))| (offset + parameter, after - before))

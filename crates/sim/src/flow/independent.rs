@@ -1,6 +1,7 @@
 //! Independent modules: those that read no integrated neighbour are integrated alone, each with steps of its own.
 
 use crate::detect::Detector;
+use crate::detect::calm::StageRange;
 use crate::detect::pulse::{ExaminedStep, MAX_UNBOUNDED, PulseFinding};
 use crate::error::Error;
 use crate::flow::FlowStage;
@@ -241,6 +242,7 @@ impl FlowStage<'_, '_> {
         let settings = self.setup.settings.for_clocks(solve.has_hazard_clock);
         let stiff = control.stiff || self.setup.settings.method.is_implicit();
         let pulses = !solve.pulses.is_empty() && !fixed;
+        integrator.keep_reached(pulses);
         let least = 64.0 * from.resolution();
         let mut tries = 0;
         let step = loop {
@@ -266,6 +268,7 @@ impl FlowStage<'_, '_> {
                 end,
                 nodes,
                 own,
+                stages: integrator.reached().map(StageRange::of_step),
                 tolerance,
                 stiff,
                 sliced: self.setup.settings.is_sliced(),

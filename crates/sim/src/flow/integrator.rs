@@ -4,7 +4,7 @@
 use crate::flow::coupled::algebra::AlgebraicError;
 use crate::flow::coupled::equations::Equations;
 use crate::{Settings, Stats};
-use dlsys_ode::{Control, Dense, Method, Nodes, Rates, StepSettings, Stepper};
+use dlsys_ode::{Control, Dense, Method, Nodes, Rates, Reached, StepSettings, Stepper};
 use dlsys_tree::SimTime;
 
 pub use dlsys_ode::{CERTAINTY, Error as StepError, next_grid_time};
@@ -77,6 +77,16 @@ impl Integrator {
     /// depends on.
     pub fn nodes(&self) -> Nodes {
         self.stepper.nodes()
+    }
+
+    /// Declares whether the range of the components at the stages is asked for.
+    pub fn keep_reached(&mut self, is_kept: bool) {
+        self.stepper.reached_is_kept = is_kept;
+    }
+
+    /// The range of the components at the stages of the step just made, if that is known.
+    pub fn reached(&self) -> Option<Reached<'_>> {
+        self.stepper.reached()
     }
 
     /// True if the implicit method was taken for some step so far.

@@ -2,13 +2,14 @@
 //!
 //! - [`World`]: the tree, the states of materialised modules, the lives of lazy ones, the solution of the coupled ones
 //! - [`state`]: rule, clause, signs, trajectories and next event of one module
-//! - [`path`]: the variables of a rule along a stretch of time
+//! - [`path`], [`course`]: the variables of a rule along a stretch of time, and at one instant after another
 //! - [`prefetch`]: memory that is asked for before it is read
 //! - [`context`], [`neighbours`]: the modules that a rule reads, and the modules that read one
 //! - [`life`]: lazy modules
 
 pub mod context;
 pub mod coupled_solution;
+pub mod course;
 pub mod life;
 pub mod neighbours;
 pub mod new_modules;

@@ -174,7 +174,7 @@ impl<'p> Path<'p> {
         self.each(
             out,
             Interval::constant,
-            |piece| piece.over(lo, hi).value,
+            |piece| if (lo, hi) == (0.0, 1.0) { piece.bounds() } else { piece.over(lo, hi).value },
             |trajectory, x, offset| trajectory.within(x, offset + lo * h, offset + hi * h).value,
             |t| Interval::spanned(t + lo * h, t + hi * h),
         );

@@ -48,6 +48,40 @@ impl Whole<'_> {
     }
 }
 
+/// By component of the coupled solution: its number in a region, or [`NOT_HERE`].
+#[derive(Clone, Default)]
+pub struct Numbers(Vec<u32>);
+
+/// The number of a component outside the region.
+const NOT_HERE: u32 = u32::MAX;
+
+impl Numbers {
+    /// Gives components their places in this list for numbers.
+    pub fn put(&mut self, components: &[u32]) {
+        for (number, &component) in components.iter().enumerate() {
+            if self.0.len() <= component as usize {
+                self.0.resize(component as usize + 1, NOT_HERE);
+            }
+            self.0[component as usize] = number as u32;
+        }
+    }
+
+    /// Takes these numbers back.
+    pub fn take_back(&mut self, components: &[u32]) {
+        components.iter().for_each(|component| self.0[*component as usize] = NOT_HERE);
+    }
+
+    /// The number of a component; None outside the region.
+    pub fn of(&self, component: u32) -> Option<u32> {
+        self.0.get(component as usize).copied().filter(|number| *number != NOT_HERE)
+    }
+
+    /// All of them.
+    pub fn all(&self) -> &[u32] {
+        &self.0
+    }
+}
+
 /// A module with rates, and the number of the first of them.
 type Row<'w> = (&'w State, u32);
 

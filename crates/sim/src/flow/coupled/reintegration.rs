@@ -26,8 +26,9 @@
 //! component as L. Where values diffuse, influence reaches as far as the square root of the time, and falls faster than
 //! exponentially beyond that.
 
+use crate::detect::calm::{RangeOfSteps, StageRange};
 use crate::flow::FlowStage;
-use crate::flow::coupled::columns::Whole;
+use crate::flow::coupled::columns::{Numbers, Whole};
 use crate::flow::coupled::equations::{Equations, RateWorkspace};
 use crate::flow::coupled::system::{Membership, System, integrated};
 use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator, StepRequest};
@@ -37,8 +38,7 @@ use crate::world::coupled_solution::{CoupledSolution, value_of};
 use crate::world::neighbours::reads;
 use crate::world::prefetch::{fetch, is_large};
 use crate::world::state::{Control, State};
-use dlsys_ode::Dense;
-use dlsys_ode::Nodes;
+use dlsys_ode::{Dense, Nodes};
 use dlsys_tree::{ModuleId, SimTime};
 use smallvec::SmallVec;
 
@@ -53,13 +53,15 @@ pub struct Reintegration {
     reaches: [StiffReach; 2],
     /// The largest effect of one component on the rate of another in the region, in stiff equations.
     strength: f64,
-    /// By component of the coupled solution: its number in the system of the region, or [`NOT_HERE`].
-    numbers: Vec<u32>,
+    /// Those of the components in the system of the region, while that is made.
+    numbers: Numbers,
     /// The equations of the region.
     system: System,
     memory: RateWorkspace,
     region: Region,
     trial: TrialSolution,
+    /// The range of the region's components, in models whose rates may have pulses.
+    range: RangeOfSteps,
     y: Vec<f64>,
     /// Id of the last traversal of modules.
     visit: u64,
@@ -86,7 +88,7 @@ struct StiffReach {
 impl Default for Reintegration {
     fn default() -> Reintegration {
         let (integrator, control, numbers, system, memory) = Default::default();
-        let (region, trial, y) = Default::default();
+        let (region, trial, range, y) = Default::default();
         Reintegration {
             integrator,
             control,
@@ -98,6 +100,7 @@ impl Default for Reintegration {
             memory,
             region,
             trial,
+            range,
             y,
             visit: 0,
         }
@@ -108,6 +111,21 @@ impl Reintegration {
     /// The positions in the last step, from 0 to 1, at which rates were evaluated.
     pub fn nodes(&self) -> Nodes {
         self.integrator.nodes()
+    }
+
+    /// Numbers the components of the last region.
+    pub fn number_components(&mut self) {
+        self.numbers.put(&self.trial.components);
+    }
+
+    /// Takes these numbers back.
+    pub fn forget_components(&mut self) {
+        self.numbers.take_back(&self.trial.components);
+    }
+
+    /// The range of the components at the stages of all steps of the last region, while they are numbered.
+    pub fn stages(&self) -> Option<StageRange<'_>> {
+        self.range.stages(self.numbers.all())
     }
 
     /// Evaluations of one module's equations so far.
@@ -161,9 +179,6 @@ const MOST: f64 = 0.5;
 /// The relative change that may be neglected in models with aggregates. A flow along branches has to be conserved
 /// whatever the tolerance, but across the edge of a region the outside still receives the flow that it had before.
 const CONSERVED: f64 = 1e-11;
-
-/// The number of a component outside the region.
-const NOT_HERE: u32 = u32::MAX;
 
 /// Modules that are integrated again, the seeds first, then ring after ring.
 #[derive(Clone, Default)]
@@ -331,8 +346,9 @@ impl FlowStage<'_, '_> {
     ) -> Option<()> {
         let solution = self.world.coupled.as_ref()?;
         let TrialSolution { stretches, components, rings } = trial;
-        let Reintegration { integrator, control, numbers, system, memory, y, reaches, strength, .. } =
-            &mut self.flows.coupled.reintegration;
+        let Reintegration {
+            integrator, control, numbers, system, memory, range, y, reaches, strength, ..
+        } = &mut self.flows.coupled.reintegration;
         stretches.clear();
         components.clear();
         rings.clear();
@@ -357,26 +373,19 @@ impl FlowStage<'_, '_> {
             let value = solution.value(*component as usize, now);
             value.unwrap_or_else(|| self.world.tree.parameters(id)[parameter])
         }));
-        for (number, &component) in components.iter().enumerate() {
-            if numbers.len() <= component as usize {
-                numbers.resize(component as usize + 1, NOT_HERE);
-            }
-            numbers[component as usize] = number as u32;
-        }
-        let number = |component: u32| numbers.get(component as usize).copied().filter(|n| *n != NOT_HERE);
+        numbers.put(components);
+        let number_of = |component: u32| numbers.of(component);
         let rules = &self.setup.model.rules;
         let frozen = self.setup.settings.is_sliced();
         let modules = Membership { world: &*self.world, members: &region.members, start: now, frozen };
         let is_explicit = stiff.is_none() && !control.stiff && !frozen;
         system.clear(now);
-        let is_bare = is_explicit && system.gather(rules, &modules, y.len(), number);
+        let is_bare = is_explicit && system.gather(rules, &modules, y.len(), number_of);
         if !is_bare {
-            system.rebuild(rules, &modules, number);
+            system.rebuild(rules, &modules, number_of);
             system.prepare_rates(rules);
         }
-        for &component in &*components {
-            numbers[component as usize] = NOT_HERE;
-        }
+        numbers.take_back(components);
         integrator.restart(self.setup.settings.method, y.len());
         // The neglected change at the edge of the region adds to the error.
         control.error =
@@ -388,6 +397,9 @@ impl FlowStage<'_, '_> {
             *strength = equations.strength(y);
             *memory = equations.memory;
         }
+        let may_pulse = self.setup.has_pulses;
+        integrator.keep_reached(may_pulse);
+        range.begin();
         let mut from = now;
         while solution.end.since(from) > 0.0 {
             if stretches.len() >= MAX_STEPS {
@@ -411,6 +423,9 @@ impl FlowStage<'_, '_> {
                 );
             }
             *memory = equations.memory;
+            if may_pulse {
+                range.add(integrator.reached());
+            }
             if let (Some(cause), 1) = (stiff, stretches.len()) {
                 reaches[cause as usize].first = stretches[0].h;
             }

@@ -116,6 +116,7 @@ impl FlowStage<'_, '_> {
         let is_unwatched =
             rules.iter().all(|rule| rule.atoms.is_empty()) && pulsing.is_empty() && system.algebra.is_empty();
         integrator.set_unwatched(is_unwatched);
+        integrator.keep_reached(!pulsing.is_empty());
         if linear.is_none() {
             if !system.is_bare {
                 system.prepare_rates(rules);

@@ -1,5 +1,6 @@
 //! The common step of the coupled modules, and the search for the next event of each member.
 
+use crate::detect::calm::StageRange;
 use crate::detect::crossing::needs_search;
 use crate::detect::pulse::{ExaminedStep, MAX_UNBOUNDED, PulseFinding};
 use crate::detect::quiet::Outlook;
@@ -157,7 +158,15 @@ impl FlowStage<'_, '_> {
         let nodes = integrator.nodes();
         let overlooked = pulsing.iter().filter_map(|id| {
             let how = (settings.tolerance, stiff, settings.is_sliced());
-            let step = examined_step(self.world, &self.setup.model.rules, *id, from, &nodes, how)?;
+            let step = examined_step(
+                self.world,
+                &self.setup.model.rules,
+                *id,
+                from,
+                &nodes,
+                integrator.reached().map(StageRange::of_step),
+                how,
+            )?;
             match self.detector.pulses.examine(&step) {
                 PulseFinding::Clear => None,
                 PulseFinding::Overlooked(at) => Some(at),
@@ -326,11 +335,17 @@ impl FlowStage<'_, '_> {
         let settings = &self.setup.coupled_settings;
         let how = (settings.tolerance, self.flows.coupled.control.stiff, settings.is_sliced());
         let (world, rules, pulses) = (&self.world, &self.setup.model.rules, &mut self.detector.pulses);
-        let nodes = &*self.flows.coupled.reintegration.nodes();
-        pulsing.into_iter().any(|id| {
-            let step = examined_step(world, rules, id, self.instant.at, nodes, how);
+        // Values that are solved for are no polynomials, though their dense output is.
+        let is_plain = self.flows.coupled.system.algebra.is_empty();
+        self.flows.coupled.reintegration.number_components();
+        let reintegration = &self.flows.coupled.reintegration;
+        let (nodes, stages) = (&*reintegration.nodes(), reintegration.stages().filter(|_| is_plain));
+        let overlooked = pulsing.into_iter().any(|id| {
+            let step = examined_step(world, rules, id, self.instant.at, nodes, stages, how);
             step.is_some_and(|step| pulses.examine(&step) != PulseFinding::Clear)
-        })
+        });
+        self.flows.coupled.reintegration.forget_components();
+        overlooked
     }
 
     /// The error of a common step that fails.
@@ -367,6 +382,7 @@ fn examined_step<'p>(
     id: ModuleId,
     start: SimTime,
     nodes: &'p [f64],
+    stages: Option<StageRange<'p>>,
     (tolerance, stiff, sliced): (f64, bool, bool),
 ) -> Option<ExaminedStep<'p>> {
     let state = world.state(id)?;
@@ -382,6 +398,7 @@ fn examined_step<'p>(
         end,
         nodes,
         own: None,
+        stages,
         tolerance,
         stiff,
         sliced,
