@@ -102,6 +102,16 @@ impl Action {
                 .unwrap_or_default();
             args.shared.rate = super::render::pace::of(args);
         }
+        if let Action::Run(args) = self
+            && args.format == RunFormat::Text
+            && let Some(extension) = args.file.out.as_deref().and_then(|out| out.extension())
+        {
+            args.format = match extension.to_str() {
+                Some("glb") => RunFormat::Glb,
+                Some("usda") => RunFormat::Usda,
+                _ => RunFormat::Text,
+            };
+        }
     }
 }
 
@@ -225,8 +235,8 @@ pub struct RunArgs {
     /// t,x,y,z,u,v,w; as JSON: a line for each sample with these fields. u, v and w are the velocity of the air along x, y and z in m/s.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["seeds", "events", "stats", "verify"])]
     pub field: Option<PathBuf>,
-    /// Output format of strings, measures or samples; or `glb`, `usda`: the growth as one animated file (with -o)
-    #[arg(long, value_enum, default_value_t = RunFormat::Text)]
+    /// Output format of strings, measures or samples; or `glb`, `usda`: the growth as one animated file (with -o) [default: that of the file that -o names, or text]
+    #[arg(long, value_enum, default_value_t = RunFormat::Text, hide_default_value = true)]
     pub format: RunFormat,
     #[command(flatten)]
     pub file: FileArgs,

@@ -73,7 +73,7 @@ pub fn refuse_flags(args: &RunArgs) -> Result<(), Failure> {
     ];
     if let Some((flag, _)) = given.iter().find(|(_, given)| *given) {
         return Err(usage(format!(
-            "{flag} is for animated files; add --format glb or usda, or leave it out and take what is printed: `dlsys run … > strings.txt`"
+            "{flag} is for animated files; name a file that ends in .glb or .usda, or add --format glb or usda; a picture is written by `dlsys render`; or leave it out and take what is printed: `dlsys run … > strings.txt`"
         )));
     }
     Ok(())

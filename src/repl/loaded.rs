@@ -8,7 +8,7 @@ use crate::interrupt;
 use crate::replay::{Replay, Stop};
 use crate::session::Session;
 use crate::sim::{self, brief};
-use crate::syntax::{suggest::did_you_mean, words};
+use crate::syntax::{foreign_lines, foreign_syntax, suggest::did_you_mean, words};
 use crate::tree::ModuleString;
 
 /// What the session does after a statement.
@@ -266,6 +266,9 @@ pub fn misused(name: &str) -> CommandError {
 /// The error for a line that is neither a command nor text of a model.
 fn unknown(text: &str) -> CommandError {
     let line = text.lines().next().unwrap_or("").trim();
+    if let Some(said) = foreign_lines::comment(line).or_else(|| foreign_syntax::line(line, 0)) {
+        return CommandError::new(format!("{}\n  {}", said.message, said.help.join("\n  ")));
+    }
     let (word, _) = first_word(line);
     let shown: String = if word.is_empty() { line.chars().take(20).collect() } else { word.to_owned() };
     let hint = did_you_mean(word, commands::names().chain(words::declarations()));

@@ -314,7 +314,7 @@ fn the_program_writes_files_whole_or_not_at_all() {
     let cases: [(&[&str], &str); 8] = [
         (&["run", "models/leaf.dls", "--format", "glb"], "name it, such as `-o leaf.glb`"),
         (&["run", "models/leaf.dls", "--format", "glb", "-o", "a.gltf"], "`-o a.glb`"),
-        (&["run", "models/leaf.dls", "-o", "a.glb"], "add --format glb"),
+        (&["run", "models/leaf.dls", "-o", "a.txt"], "add --format glb"),
         (
             &["run", "models/leaf.dls", "--format", "glb", "-o", "a.glb", "--seeds", "1..2"],
             "--seeds does not go",
@@ -332,6 +332,9 @@ fn the_program_writes_files_whole_or_not_at_all() {
         assert!(message.contains(expected), "{arguments:?}: {message}");
     }
     let (_, message) = bad(&["run", "models/leaf.dls", "--format", "glb", "-o", &at("thesis.glb")]);
+    assert!(message.contains("is not a GLB file"), "{message}");
+    // The format follows from the name.
+    let (_, message) = bad(&["run", "models/leaf.dls", "-o", &at("thesis.glb")]);
     assert!(message.contains("is not a GLB file"), "{message}");
     assert_eq!(fs::read_to_string(at("thesis.glb")).expect("there"), "years of work");
     assert!(!repository("a.glb").exists());

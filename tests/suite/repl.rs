@@ -43,6 +43,16 @@ fn scripts_give_their_transcripts() {
     }
 }
 
+/// Lines of cpfg get the hints that they get in a file.
+#[test]
+fn lines_of_cpfg_get_their_hints() {
+    let (code, _, complaints) = session(&[], "homomorphism\n/* a tree */\nendlsystem\n");
+    assert_eq!(code, 1);
+    for hint in ["`interpret A(x): F(x)`", "a comment begins with `#`", "a model ends with its file"] {
+        assert!(complaints.contains(hint), "{hint}: {complaints}");
+    }
+}
+
 #[test]
 fn files_are_written_whole_and_those_of_others_left_alone() {
     let folder = tempfile::tempdir().expect("a folder");

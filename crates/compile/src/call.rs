@@ -82,6 +82,7 @@ impl Scope {
         }
         if let Some((_, op)) = Unary::NAMED.iter().find(|(n, _)| **n == **name) {
             count(self, 1)?;
+            self.doubt_degrees(call, *op, nodes[0]);
             return number(self.graph.unary(*op, nodes[0]));
         }
         if let Some((_, op)) = Binary::NAMED.iter().find(|(n, _)| **n == **name) {
@@ -103,6 +104,34 @@ impl Scope {
         }
         self.unknown_function(call, variables);
         None
+    }
+
+    /// Warns of the sine of a constant that looks like degrees, which are what functions of cpfg take.
+    fn doubt_degrees(&mut self, call: &Call, op: Unary, argument: NodeId) {
+        let Some(angle) = self.graph.as_constant(argument) else { return };
+        // More than a full turn, in steps that no sum of parts of π has.
+        let is_of_degrees = angle.abs() > std::f64::consts::TAU && (2.0 * angle).fract() == 0.0;
+        let known =
+            self.diagnostics.iter().any(|known| known.labels.iter().any(|(span, _)| *span == call.span));
+        if !matches!(op, Unary::Sin | Unary::Cos | Unary::Tan) || !is_of_degrees || known {
+            return;
+        }
+        let Call { all, name, span, arguments } = *call;
+        let text = print::expression(all, arguments[0].0);
+        let is_simple = text.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '.'));
+        let factor = if is_simple { text.clone() } else { format!("({text})") };
+        let turns = (angle / std::f64::consts::TAU).round();
+        let sign = if turns < 0.0 { '+' } else { '-' };
+        let degrees = (angle.to_degrees() * 10.0).round() / 10.0;
+        self.diagnostics.push(
+            Diagnostic::warning(format!("`{name}` takes radians"))
+                .at(span, format!("of {degrees} degrees; in cpfg of {angle} degrees"))
+                .help(format!("for degrees, write `{name}({factor}*pi/180)`"))
+                .help(format!(
+                    "for radians, leave out whole turns: `{name}({text} {sign} {}*pi)`",
+                    2.0 * turns.abs()
+                )),
+        );
     }
 
     /// Reports a function without a declaration, once for each name.

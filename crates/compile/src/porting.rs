@@ -5,10 +5,13 @@ use std::collections::HashMap;
 use crate::clauses::names_of;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{Class, DRAWN_WORDS, KindId, Model, base_of};
-use dlsys_syntax::ast::{self, Action, Document, Item, Stray, modules_of};
+use dlsys_syntax::ast::{self, Action, Document, Expr, Expressions, Item, Stray, modules_of};
 use dlsys_syntax::foreign_syntax;
 use dlsys_syntax::print;
 use dlsys_syntax::suggest::nearest;
+
+/// Most warnings of one kind.
+const MOST: usize = 5;
 
 /// Warns of `#(w)`, which is a comment.
 pub fn comments(document: &Document, diagnostics: &mut Vec<Diagnostic>) {
@@ -57,6 +60,17 @@ pub fn strings(document: &Document, written: &[&ast::Rule], diagnostics: &mut Ve
         Item::Axiom(modules) => Some(modules),
         _ => None,
     });
+    let drawings = document.items.iter().filter_map(|(item, _)| match item {
+        Item::Interpret { drawn, .. } => Some(drawn),
+        _ => None,
+    });
+    let successors =
+        written.iter().flat_map(|rule| &rule.clauses).filter_map(|clause| match &clause.action {
+            Action::Produce(all) => Some(all.iter().flat_map(|alternative| modules_of(&alternative.modules))),
+            Action::Solve(_) => None,
+        });
+    let all = axioms.clone().chain(drawings).flat_map(|parts| modules_of(parts)).chain(successors.flatten());
+    diagnostics.extend(all.filter_map(|module| of_parameters(module, &document.expressions)).take(MOST));
     // A subscript says which turns are meant.
     let both: Vec<&&ast::Rule> = written.iter().filter(|rule| &*rule.predecessor.name.text == "±").collect();
     for module in axioms.flat_map(|parts| modules_of(parts)) {
@@ -84,6 +98,26 @@ pub fn strings(document: &Document, written: &[&ast::Rule], diagnostics: &mut Ve
                 .at(module.span, "cpfg and L-Py subtract a step from the width here")
                 .help("write the width, `!(w)`, with a parameter that carries it: `A(l, w) -> !(w) F(l) A(l, w - 0.1)`"),
         );
+    }
+}
+
+/// The warning for a parameter that cpfg gives a meaning that it does not have here.
+fn of_parameters(module: &ast::Module, all: &Expressions) -> Option<Diagnostic> {
+    let text = |i: usize| print::expression(all, module.arguments[i].root);
+    let is_number = |i: usize| matches!(all.get(module.arguments[i].root), Expr::Number(_));
+    match (&*module.name, module.arguments.len()) {
+        ("{", 1..) => Some(
+            Diagnostic::warning(format!("`{{({})` begins a polygon, and its parameter means nothing", text(0)))
+                .at(module.span, "in cpfg a generalised cylinder begins here")
+                .help("consecutive lines are one smooth stem without further signs: leave `{(…)` and its `}` out; `@W(w)` gives it its width at this place, and `@C(name)` a cross-section")
+                .help("a polygon begins with `{` alone"),
+        ),
+        (";", 2) if is_number(0) && is_number(1) => Some(
+            Diagnostic::warning(format!("the second parameter of `;` means nothing here: both sides have colour {}", text(0)))
+                .at(module.span, "in cpfg this is the colour of the back")
+                .help(format!("leave it out: `;({})`; a second parameter is a place in a gradient, from 0 to 1: `gradient leaf = \"#8bb04f\", \"#4f8a3a\"`, then `;(leaf, 0.5)`", text(0))),
+        ),
+        _ => None,
     }
 }
 

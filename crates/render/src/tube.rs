@@ -149,7 +149,8 @@ impl<'s> Tubes<'s> {
                 tubes.profiles.push(Profile::new(spokes));
                 tubes.profiles.len() - 1
             });
-            let fork = if style.steady { Vec::new() } else { structure.fork(segments, first) };
+            let (fork, within) =
+                if style.steady { Default::default() } else { structure.fork(segments, first) };
             let (begin, collar) = match style.grown {
                 true if !fork.is_empty() => (Begin::Flat, None),
                 true => structure.beginning(scene, first, &style),
@@ -158,11 +159,12 @@ impl<'s> Tubes<'s> {
             members.splice(0..0, fork.iter().copied());
             let radii = &structure.radii;
             let TubeStyle { accuracy, steady, .. } = style;
-            let chain = Chain { segments, radii, members: &members, accuracy, steady };
+            let forks = &structure.ends[..];
+            let chain = Chain { segments, radii, members: &members, forks, within, accuracy, steady };
             parts.clear();
             chain.parts(style.grown, collar.as_ref(), &mut parts);
             if !fork.is_empty() {
-                chain::begin_within(&fork, first, segments, &mut parts);
+                chain::begin_within(&fork, segments, &mut parts);
             }
             let before = structure.before(segments, first);
             if let Some(&part) = parts.first().filter(|_| style.grown && before > 0.0) {

@@ -63,11 +63,19 @@ pub fn comment(text: &str) -> Option<Diagnostic> {
         let is_word = |rest: &str| rest.trim_start().starts_with(|c: char| c.is_alphabetic());
         let is_comment = body.starts_with("/*") || body.strip_prefix("//").is_some_and(is_word);
         if is_comment {
-            return Some(
-                Diagnostic::error(format!("`{}` begins no comment", &body[..2]))
-                    .at(Span::new(at, at + 2), "here it is a turn of the turtle, or a quotient")
-                    .help("a comment begins with `#` and ends with its line"),
-            );
+            let error = Diagnostic::error(format!("`{}` begins no comment", &body[..2]))
+                .at(Span::new(at, at + 2), "here it is a turn of the turtle, or a quotient");
+            let help = match text[at..].find("*/").filter(|_| body.starts_with("/*")) {
+                _ if body.starts_with("//") => "a comment begins with `#` and ends with its line",
+                Some(end) if text[at..at + end].contains('\n') => {
+                    "a comment begins with `#` and ends with its line: begin each of these lines with `#`, up to the one with `*/`"
+                }
+                Some(_) => "a comment begins with `#` and ends with its line",
+                None => {
+                    "a comment begins with `#` and ends with its line; this one has no `*/`: begin each line that is meant with `#`"
+                }
+            };
+            return Some(error.help(help));
         }
         start += line.len();
     }

@@ -77,7 +77,7 @@ const STEPS: &str = "there are no derivation steps; write the times to look at: 
 const RULES: &str = "remove this line: rules stand among declarations, `A(x): if x = 1 produce F(x) A(0)`, or discrete `A(x) : x > 3 -> F(x) A(0)`";
 const PRODUCE: &str = "a clause has one successor, and strings are not put together by statements: `if x = 1 produce F(x) A(0)`; modules that repeat are productions of their own";
 const STATEMENTS: &str = "a model is no program: what is to change in time is a parameter with an equation, `A(x): solve dx/dt = 1`";
-const DRAWINGS: &str = "remove this line: each drawing is a line of its own, `interpret A(x): F(x)`";
+const DRAWINGS: &str = "remove this line, and write `interpret` before each of the rules below it, with `:` in place of the arrow (and without `: *`): `A(x) --> F(x)` becomes `interpret A(x): F(x)`; otherwise they are productions";
 const PARTS: &str = "remove this line: what falls into parts at once has a rule, `A(x): produce F(x) B(x)`";
 
 /// The error for a line that begins with such words. `at` is the byte at which the line begins.
@@ -205,7 +205,12 @@ pub fn module(name: &str) -> Option<&'static str> {
         "PP" => "a vertex of a polygon is `.`",
         "EP" => "a polygon ends with `}`",
         "@Gs" | "@Gc" | "@Ge" | "@Gt" => CYLINDERS,
-        "@D" | "@R" | "@V" => "directions are relative: a turn is `+(a)`, `&(a)` or `/(a)`",
+        "@v" => "a roll until the left side is horizontal is `$`",
+        "@c" | "@o" => "there are no circles; `@O(d)` is a ball with the diameter d",
+        "@M" => {
+            "the turtle goes to no coordinates: `f(l)` is a step without a line, behind turns such as `+(a)`; a surface of this name is declared with `surface @M from \"m.s\"`"
+        }
+        "@D" | "@R" | "@V" | "@H" => "directions are relative: a turn is `+(a)`, `&(a)` or `/(a)`",
         _ => return None,
     })
 }

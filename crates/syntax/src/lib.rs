@@ -21,7 +21,7 @@ pub mod ast;
 pub mod declarations;
 mod error;
 mod files;
-mod foreign_lines;
+pub mod foreign_lines;
 pub mod foreign_syntax;
 pub mod format;
 mod grammar;

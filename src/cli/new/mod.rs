@@ -8,12 +8,14 @@ use clap::Args;
 
 use super::common::{Failure, out_error};
 
-/// The model, with `NAME` for the name.
+/// The model, with `NAME` for the name: a flowering herb.
 const START: &str = include_str!("start.dls");
+/// The same for plants with this name.
+const FERN: (&str, &str) = ("fern", include_str!("fern.dls"));
 
 #[derive(Debug, Args)]
 pub struct NewArgs {
-    /// Name of the plant; the model is NAME.dls
+    /// Name of the plant; the model is NAME.dls: a flowering herb, or a fern if the name says so
     pub name: PathBuf,
 }
 
@@ -81,7 +83,8 @@ fn typed(path: &Path) -> String {
 /// The text of the model, without characters of the name that a title cannot have.
 fn text(name: &str) -> String {
     let name: String = name.chars().filter(|c| *c != '"' && !c.is_control()).collect();
-    START.replace("NAME", &name)
+    let model = if name.to_lowercase().contains(FERN.0) { FERN.1 } else { START };
+    model.replace("NAME", &name)
 }
 
 #[cfg(test)]
@@ -91,13 +94,17 @@ mod tests {
     use crate::syntax::format::format;
 
     #[test]
-    fn the_model_is_good_and_tidy() {
-        let text = super::text("a \"fern\"\n");
-        let session = Session::from_text("fern.dls", &text, &[]).expect("a good model");
-        assert!(session.warnings.is_empty(), "{:?}", session.warnings);
-        assert_eq!(session.model.title.as_deref(), Some("a fern"));
-        assert_eq!(format(&Source::new("fern.dls", &*text)).expect("good"), text);
-        assert_eq!(session.model.frames.expect("frames").times().count(), 161);
-        assert!(text.lines().count() < 40);
+    fn the_models_are_good_and_tidy() {
+        for (name, title, first) in [("a \"rose\"\n", "a rose", "Foot"), ("Tree fern", "Tree fern", "Frond")]
+        {
+            let text = super::text(name);
+            let session = Session::from_text("new.dls", &text, &[]).expect("a good model");
+            assert!(session.warnings.is_empty(), "{:?}", session.warnings);
+            assert_eq!(session.model.title.as_deref(), Some(title));
+            assert!(text.contains(&format!("{first}(")), "{title}");
+            assert_eq!(format(&Source::new("new.dls", &*text)).expect("good"), text);
+            assert_eq!(session.model.frames.expect("frames").times().count(), 161);
+            assert!(text.lines().count() < 40);
+        }
     }
 }

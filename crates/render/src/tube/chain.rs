@@ -20,6 +20,12 @@ const STRAIGHT: f64 = 1e-6;
 const ROUNDING: f64 = 2.5;
 /// Pieces of a taper on either side of its bend.
 const TAPER_PIECES: f64 = 3.0;
+/// Where a stem forks, it keeps its width up to the joint, and each shoot tapers behind it: over this part of the stem's radius, and that of
+/// the change of it.
+const FORK: f64 = 1.2;
+const FORK_CHANGE: f64 = 3.0;
+/// Pieces of that.
+const FORK_PIECES: f64 = 8.0;
 
 /// A part of a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,9 +48,24 @@ pub(super) struct Chain<'a> {
     pub(super) radii: &'a [[f64; 2]],
     /// Its segments in order.
     pub(super) members: &'a [usize],
+    /// The segments at whose end an axis forks.
+    pub(super) forks: &'a [usize],
+    /// How it begins within another stem.
+    pub(super) within: Within,
     /// See [`TubeStyle`](super::TubeStyle).
     pub(super) accuracy: f64,
     pub(super) steady: bool,
+}
+
+/// How a stem begins within another one, which goes on into it and into others.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Within {
+    /// How many segments of its chain are the other stem's; 0: it does not.
+    pub(super) run: usize,
+    /// How far before the end of these it begins.
+    pub(super) reach: f64,
+    /// How much of the other stem's width it has there, from none of the difference, 0, to all of it.
+    pub(super) part: f64,
 }
 
 /// The widening of a stem towards a thicker one that it continues, or that continues it.
@@ -75,13 +96,14 @@ struct Bend {
     taper: Option<Taper>,
 }
 
-/// The smooth change of a stem's width where it turns: half before the bend and half after it, so that it does not bulge there.
+/// The smooth change of a stem's width where it turns: half before the bend and half after it, so that it does not bulge there; all of it
+/// after the bend where the stem forks, so that its shoots are as wide as the stem where they part.
 #[derive(Clone, Copy)]
 struct Taper {
     /// What the radius gains.
     change: f64,
-    /// How far from the bend it begins and ends.
-    reach: f64,
+    /// How far before the bend it begins, and how far behind it it ends.
+    reach: [f64; 2],
 }
 
 impl Bend {
@@ -107,20 +129,24 @@ impl Bend {
 
     /// What it adds to the radius of a member at a length along the chain.
     fn height(&self, member: usize, at: f64) -> f64 {
-        let Some(Taper { change, reach }) = self.taper else { return 0.0 };
-        let u = (0.5 + 0.5 * (at - self.at) / reach).clamp(0.0, 1.0);
+        let Some(Taper { change, reach: [before, after] }) = self.taper else { return 0.0 };
+        let u = ((at - self.at + before) / (before + after)).clamp(0.0, 1.0);
         let part = u * u * (3.0 - 2.0 * u);
         change * if member < self.member { part } else { part - 1.0 }
     }
 
     fn stations(&self) -> impl Iterator<Item = f64> + use<> {
         let at = self.at;
-        let around = |reach: f64, pieces: f64| {
-            let (step, pieces) = (reach / pieces, pieces as i32);
-            (-pieces..=pieces).filter(|k| *k != 0).map(move |k| at + step * f64::from(k))
+        let around = |[before, after]: [f64; 2], pieces: f64| {
+            let (step, pieces) = (0.5 * (before + after) / pieces, pieces as i32);
+            let middle = at + 0.5 * (after - before);
+            (-pieces..=pieces).map(move |k| middle + step * f64::from(k)).filter(move |place| *place != at)
         };
-        let taper = self.taper.map(|taper| around(taper.reach, TAPER_PIECES));
-        around(self.reach, self.pieces).chain(taper.into_iter().flatten())
+        let taper = self.taper.map(|taper| match taper.reach {
+            [0.0, after] => around([0.0, after], 0.5 * FORK_PIECES),
+            reach => around(reach, TAPER_PIECES),
+        });
+        around([self.reach; 2], self.pieces).chain(taper.into_iter().flatten())
     }
 }
 
@@ -147,20 +173,27 @@ pub(super) fn reach_of_bend(directions: [Vector; 2], radius: f64) -> f64 {
     ROUNDING * radius * half / (1.0 - half * half).max(1e-6).sqrt()
 }
 
-/// Takes from the parts of a chain those of the straight `run` at its beginning up to where it begins to turn or to taper into the next
-/// segment, `first`: all of it is another tube's. What is left begins a little within that.
-pub(super) fn begin_within(run: &[usize], first: usize, segments: &[Segment], parts: &mut Vec<Part>) {
-    /// The part of the other tube's radius.
-    const WITHIN: f64 = 0.97;
+/// Takes from the parts of a chain those of the straight `run` at its beginning up to where the first of the stems that leave it begins to
+/// turn: all of that is another tube's. What is left begins a little within that.
+pub(super) fn begin_within(run: &[usize], segments: &[Segment], parts: &mut Vec<Part>) {
+    /// By which part of its radius it is thinner where it begins; less and less up to the fork, so that no edge can be seen.
+    const THINNER: f64 = 0.006;
     let is_whole =
         |part: &&Part| run.contains(&part.segment) && part.centres[1] == segments[part.segment].end;
     let whole = parts.iter().take_while(is_whole).count();
     // Up to the first cross-section between ends of segments.
     let is_cut = parts.get(whole).is_some_and(|part| run.contains(&part.segment));
     parts.drain(..whole + usize::from(is_cut));
-    parts.iter_mut().take_while(|part| run.contains(&part.segment)).for_each(|part| part.segment = first);
-    if let Some(part) = parts.first_mut() {
-        part.radii[0] *= WITHIN;
+    let shared = parts.iter().take_while(|part| run.contains(&part.segment)).count();
+    let length = |part: &Part| (part.centres[1] - part.centres[0]).norm();
+    let all: f64 = parts[..shared].iter().map(length).sum();
+    let mut left = all;
+    for part in &mut parts[..shared] {
+        let ends = [left, left - length(part)];
+        for (radius, left) in part.radii.iter_mut().zip(ends) {
+            *radius *= 1.0 - THINNER * left.max(0.0) / all;
+        }
+        left = ends[1];
     }
 }
 
@@ -170,7 +203,7 @@ impl Chain<'_> {
         let count = self.members.len();
         let steps: Vec<usize> = (1..count).filter(|&i| grown && self.steps(i)).collect();
         let bends = grown && !self.steady && (1..count).any(|i| self.needs_rounding(i));
-        if steps.is_empty() && collar.is_none() && !bends {
+        if steps.is_empty() && collar.is_none() && !bends && self.within.run == 0 {
             out.extend(self.members.iter().map(|&i| {
                 let Segment { start, end, direction, .. } = self.segments[i];
                 let radii = self.radii[i];
@@ -189,11 +222,16 @@ impl Chain<'_> {
         let mut stations: Vec<Station> =
             blends.iter().flat_map(|blend| self.stations(blend)).map(plain).collect();
         stations.extend(bends.iter().flat_map(Bend::stations).map(plain));
+        let within = self.within;
+        if within.run > 0 {
+            stations.push(plain(arcs[within.run] - within.reach.min(0.6 * arcs[within.run])));
+        }
         if let Some(collar) = collar {
             let free = (1..count).find(|&i| steps.first() == Some(&i) || self.turns(i)).unwrap_or(count);
             stations.extend(collar.stations((!self.steady).then_some(self.accuracy), arcs[free]));
         }
         stations.sort_by(|a, b| a.at.total_cmp(&b.at));
+        let own = self.members.get(within.run).map_or(0.0, |first| self.radii[*first][0]);
         let reach = collar.map_or(0.0, Collar::reach);
         let (mut near, mut stations) = (0, stations.into_iter().peekable());
         for (member, &segment) in self.members.iter().enumerate() {
@@ -202,6 +240,7 @@ impl Chain<'_> {
             let radius = |part: f64| {
                 let [a, b] = self.radii[segment];
                 let plain = if part == 1.0 { b } else { a + (b - a) * part };
+                let plain = if member < within.run { own + (plain - own) * within.part } else { plain };
                 let at = first + length * part;
                 // Blends do not overlap; of one place the rounding of lengths may count either neighbour as next.
                 let next = blends.partition_point(|blend| blend.at <= at);
@@ -297,13 +336,20 @@ impl Chain<'_> {
             let on = bound(Some(k + 1).filter(|k| *k < turns.len()), self.members.len()) - arcs[i];
             let directions = self.directions_at(i);
             let half = (directions[0] - directions[1]).norm() / 2.0;
-            let reach = reach_of_bend(directions, a.max(b)).min(0.5 * back).min(0.5 * on);
+            let part = if i == self.within.run { self.within.part } else { 1.0 };
+            let reach = reach_of_bend(directions, a.max(b)).min(0.5 * back).min(0.5 * on) * part.max(0.05);
             let point = self.segments[self.members[i]].start;
             // A piece turns by 8 degrees at most.
             let pieces = (half.asin().to_degrees() / 8.0).ceil().max(1.0);
+            let forks = self.forks.binary_search(&self.members[i - 1]).is_ok();
             let taper = (steps && thick - thin > self.accuracy).then(|| {
-                let long = reach.max(0.5 * length_of_blend(thin, thick - thin));
-                Taper { change: b - a, reach: long.min(0.5 * back).min(0.5 * on) }
+                let reach = if forks {
+                    [0.0, (FORK * thick + FORK_CHANGE * (thick - thin)).min(0.9 * on)]
+                } else {
+                    let long = reach.max(0.5 * length_of_blend(thin, thick - thin));
+                    [long.min(0.5 * back).min(0.5 * on); 2]
+                };
+                Taper { change: (b - a) * part, reach }
             });
             bends.push(Bend { member: i, at: arcs[i], reach, point, directions, pieces, taper });
         }

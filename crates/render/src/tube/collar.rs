@@ -79,20 +79,20 @@ pub(super) struct Station {
 }
 
 impl Collar {
-    /// The collar of a branch with this direction and radius. `None` if it would be no higher than `accuracy`.
+    /// The collar of a branch with this direction and radius, and this part of its height. `None` if it would be no higher than `accuracy`.
     pub(super) fn of_branch(
         [joint, direction]: [Vector; 2],
         radius: f64,
         parent: (Vector, f64),
         ahead: Option<(Vector, f64)>,
-        accuracy: f64,
+        (accuracy, share): (f64, f64),
     ) -> Option<Collar> {
         let (back, thickness) = parent;
         // The one of both directions on whose side the branch is.
         let (along, wide) = ahead.filter(|(ahead, _)| direction.dot(ahead) > 0.0).unwrap_or(parent);
         let (sin, cos) = (direction.cross(&along).norm(), direction.dot(&along));
         let part = ((sin - FROM) / (FULL - FROM)).clamp(0.0, 1.0);
-        let height = HEIGHT * radius.min(wide) * part * part * (3.0 - 2.0 * part);
+        let height = HEIGHT * radius.min(wide) * part * part * (3.0 - 2.0 * part) * share;
         if height <= accuracy {
             return None;
         }
@@ -240,7 +240,7 @@ mod tests {
     fn collar(angle: f64) -> (Collar, Vector) {
         let direction = Vector::new(angle.sin(), angle.cos(), 0.0);
         let (joint, up) = (Vector::new(0.0, 1.0, 0.0), Vector::y());
-        let collar = Collar::of_branch([joint, direction], 0.5, (up, 1.0), Some((up, 1.0)), 1e-6);
+        let collar = Collar::of_branch([joint, direction], 0.5, (up, 1.0), Some((up, 1.0)), (1e-6, 1.0));
         (collar.expect("high enough"), direction)
     }
 

@@ -1,5 +1,6 @@
 //! How the segments of a scene hang together: which of them share a ring, and how each tube begins.
 
+use super::chain::Within;
 use super::{Begin, Collar, NONE, TubeStyle, can_join, chain};
 use dlsys_geometry::scene::{Scene, Segment};
 
@@ -8,6 +9,12 @@ const TAKES_OVER: f64 = 1.02;
 /// A branch goes on from the end of an axis, which narrows to it, from this part of its width on. Two equal branches that share
 /// the cross-section of their stem have 0.71 of its width, three 0.58.
 const GOES_ON: f64 = 0.5;
+/// Between these parts of its width, a further branch at the end of an axis changes from one that comes out of a collar to one that the axis
+/// goes on into as well; and so it does while it grows in length from what its bend needs to this many times that.
+const PARTS: [f64; 2] = [0.42, 0.62];
+const LONG: f64 = 2.4;
+/// Stems that part are straight up to this part of their radius before the first of them turns.
+const STRAIGHT: f64 = 0.3;
 /// A branch that is wider than the axis ever was by this ratio is no limb of it.
 const LIMB: f64 = 1.001;
 
@@ -29,6 +36,11 @@ pub(super) struct Structure {
     leaves: Vec<usize>,
     /// The segment at whose end each bends away beside the branch that goes on from there, or `NONE`; none if that happens nowhere.
     forks: Vec<usize>,
+    /// How far it is between a branch with a collar (0) and one that the axis goes on into (1); none if that happens nowhere.
+    parting: Vec<f64>,
+    /// The segments at whose end an axis goes on into branches, in order, and how far before it all of these are still straight.
+    pub(super) ends: Vec<usize>,
+    reaches: Vec<f64>,
 }
 
 impl Structure {
@@ -59,8 +71,17 @@ impl Structure {
                 continues[i] = true;
             }
         }
-        let mut structure =
-            Structure { radii, next, ahead, continues, leaves: Vec::new(), forks: Vec::new() };
+        let mut structure = Structure {
+            radii,
+            next,
+            ahead,
+            continues,
+            leaves: Vec::new(),
+            forks: Vec::new(),
+            parting: Vec::new(),
+            ends: Vec::new(),
+            reaches: Vec::new(),
+        };
         if grown {
             structure.give_way(segments, kept);
         }
@@ -102,14 +123,46 @@ impl Structure {
             }
         }
         ends.sort_unstable();
+        self.reaches = ends.iter().map(|&end| self.reach(segments, [end, self.next[end]])).collect();
         for (i, segment) in segments.iter().enumerate().filter(|(i, _)| !self.continues[*i]) {
-            let Some(parent) = segment.grows_from.filter(|_| segment.follows.is_none()) else { continue };
-            let at_end = kept(i) && ends.binary_search(&parent).is_ok();
-            if at_end && self.goes_on(parent, i) && self.is_limb(segments, [parent, i], &widest) {
+            let Some(parent) = segment.grows_from.filter(|_| segment.follows.is_none() && kept(i)) else {
+                continue;
+            };
+            let Ok(end) = ends.binary_search(&parent) else { continue };
+            if !self.is_limb(segments, [parent, i], &widest) {
+                continue;
+            }
+            self.parting.resize(segments.len(), 0.0);
+            self.parting[i] = self.parts(segments, [parent, i]);
+            if self.parting[i] > 0.5 {
                 self.forks.resize(segments.len(), NONE);
                 self.forks[i] = parent;
+                self.reaches[end] = self.reaches[end].max(self.reach(segments, [parent, i]));
             }
         }
+        self.ends = ends;
+    }
+
+    /// How far a branch at the end of an axis is between one with a collar and one that the axis goes on into. It changes with its size without
+    /// a jump, so that nothing jumps in a film.
+    fn parts(&self, segments: &[Segment], ends: [usize; 2]) -> f64 {
+        let [from, to] = ends.map(|i| segments[i].direction);
+        let (wide, width) = (self.radii[ends[0]][1], self.radii[ends[1]][0]);
+        let half = (from - to).norm() / 2.0;
+        let need = wide * (2.0 * half / (1.0 - half * half).max(1e-6).sqrt()).max(1.0);
+        let long = self.straight(segments, ends).into_iter().fold(f64::INFINITY, f64::min);
+        let smooth = |u: f64| {
+            let u = u.clamp(0.0, 1.0);
+            u * u * (3.0 - 2.0 * u)
+        };
+        let [least, most] = PARTS;
+        smooth((width / wide - least) / (most - least)) * smooth((long / need - 1.0) / (LONG - 1.0))
+    }
+
+    /// How far before the end of a segment a branch that goes on from there is still straight.
+    fn reach(&self, segments: &[Segment], [parent, branch]: [usize; 2]) -> f64 {
+        let wide = self.radii[parent][1].max(self.radii[branch][0]);
+        chain::reach_of_bend([segments[parent].direction, segments[branch].direction], wide) + STRAIGHT * wide
     }
 
     /// Whether a branch is wide enough to go on from the end of an axis.
@@ -136,6 +189,16 @@ impl Structure {
         if thick > (1.0 + chain::MOST) * thin {
             return can_join(from, to, radii);
         }
+        let [back, on] = self.straight(segments, [parent, branch]);
+        let as_long = |segment: &Segment, length: f64| Segment {
+            end: segment.start + segment.direction * length,
+            ..segment.clone()
+        };
+        can_join(&as_long(from, back), &as_long(to, on), [thick; 2])
+    }
+
+    /// For how long a stem is straight up to the end of one segment, and from the beginning of another on.
+    fn straight(&self, segments: &[Segment], [parent, branch]: [usize; 2]) -> [f64; 2] {
         let length = |segment: &Segment| (segment.end - segment.start).norm();
         let goes_straight =
             |a: usize, b: usize| segments[a].direction.cross(&segments[b].direction).norm() < 1e-6;
@@ -144,18 +207,15 @@ impl Structure {
             |at: &usize| Some(self.ahead[*at]).filter(|after| *after != NONE && goes_straight(*at, *after));
         let back: f64 = std::iter::successors(Some(parent), before).map(|i| length(&segments[i])).sum();
         let on: f64 = std::iter::successors(Some(branch), after).map(|i| length(&segments[i])).sum();
-        let as_long = |segment: &Segment, length: f64| Segment {
-            end: segment.start + segment.direction * length,
-            ..segment.clone()
-        };
-        can_join(&as_long(from, back), &as_long(to, on), [thick; 2])
+        [back, on]
     }
 
-    /// The straight run of segments at the end of which the tube bends away whose first segment this is; empty where none does so.
-    pub(super) fn fork(&self, segments: &[Segment], first: usize) -> Vec<usize> {
+    /// The straight run of segments at the end of which the tube bends away whose first segment this is; an empty one where none does so.
+    pub(super) fn fork(&self, segments: &[Segment], first: usize) -> (Vec<usize>, Within) {
         let Some(parent) = self.forks.get(first).copied().filter(|parent| *parent != NONE) else {
-            return Vec::new();
+            return (Vec::new(), Within::default());
         };
+        let reach = self.ends.binary_search(&parent).map_or(0.0, |end| self.reaches[end]);
         let along = segments[parent].direction;
         let before = |at: &usize| {
             let before = segments[*at].follows.filter(|before| self.next[*before] == *at)?;
@@ -163,7 +223,8 @@ impl Structure {
         };
         let mut run: Vec<usize> = std::iter::successors(Some(parent), before).collect();
         run.reverse();
-        run
+        let within = Within { run: run.len(), reach, part: 2.0 * self.parting[first] - 1.0 };
+        (run, within)
     }
 
     /// The segment that this one comes out of as a branch.
@@ -215,8 +276,10 @@ impl Structure {
             let thickness = self.radii[parent][1].max(joined);
             let ahead = ahead.map(|i| (scene.segments[i].direction, self.radii[i][0]));
             let back = (scene.segments[parent].direction, thickness);
-            let collar =
-                Collar::of_branch([start.coords, segment.direction], radius, back, ahead, style.accuracy);
+            let parting = self.parting.get(first).filter(|_| !style.steady).copied().unwrap_or(0.0);
+            let place = [start.coords, segment.direction];
+            let part = (1.0 - 2.0 * parting).max(0.0);
+            let collar = Collar::of_branch(place, radius, back, ahead, (style.accuracy, part));
             // A thicker one would show its cut.
             let begin = if radius <= 1.001 * thickness { Begin::Flat } else { Begin::Dome };
             return (begin, collar.filter(|_| begin == Begin::Flat));

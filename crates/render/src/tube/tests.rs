@@ -204,3 +204,85 @@ fn an_organ_does_not_take_over() {
     let trunk = with.segments[0].owner;
     assert_eq!(count(&with, trunk), count(&without, trunk));
 }
+
+/// A trunk that ends in shoots with these widths and lengths, all of them branches, leaning to different sides.
+fn shoots(all: &[(f64, f64)]) -> Scene {
+    let mut scene = Scene::default();
+    let end = stem(&mut scene, (Point::origin(), None), &[(Vector::y() * 3.0, 1.0)], 1);
+    for (k, (width, length)) in all.iter().enumerate() {
+        let (sin, cos) = (2.0 * std::f64::consts::PI * k as f64 / all.len() as f64 + 0.2).sin_cos();
+        let direction = Vector::new(0.6 * cos, 0.8, 0.6 * sin);
+        stem(&mut scene, end, &[(direction * *length, *width)], 1);
+    }
+    scene
+}
+
+/// How far away a mesh is along each of some rays towards -x; infinite beside it.
+fn depths(mesh: &Triangles) -> Vec<f64> {
+    let mut depths = vec![f64::INFINITY; 30 * 40];
+    for face in &mesh.faces {
+        let [p, q, r] = face.corners.map(|(vertex, _)| mesh.vertices[vertex as usize]);
+        let area = (q.y - p.y) * (r.z - p.z) - (q.z - p.z) * (r.y - p.y);
+        if area.abs() < 1e-14 {
+            continue;
+        }
+        for (i, depth) in depths.iter_mut().enumerate() {
+            let (y, z) = (2.0 + 2.0 * (i / 30) as f64 / 40.0, -1.0 + 2.0 * (i % 30) as f64 / 30.0);
+            let part = |a: &Point, b: &Point| ((a.y - y) * (b.z - z) - (a.z - z) * (b.y - y)) / area;
+            let parts = [part(&q, &r), part(&r, &p), part(&p, &q)];
+            if parts.iter().all(|part| *part >= -1e-12) {
+                *depth = depth.min(-(parts[0] * p.x + parts[1] * q.x + parts[2] * r.x));
+            }
+        }
+    }
+    depths
+}
+
+/// The mean difference of two shapes as seen from the side, in parts of the trunk's width; where only one is seen, that width.
+fn change(a: &[f64], b: &[f64]) -> f64 {
+    let seen: Vec<f64> = a
+        .iter()
+        .zip(b)
+        .filter(|(a, b)| a.is_finite() || b.is_finite())
+        .map(|(a, b)| if a.is_finite() && b.is_finite() { (a - b).abs().min(1.0) } else { 1.0 })
+        .collect();
+    seen.iter().sum::<f64>() / seen.len() as f64
+}
+
+/// Where a stem ends in branches, they leave it as wide as it is: nothing narrows at the joint, and meshes are closed.
+#[test]
+fn shoots_leave_their_stem_without_a_neck() {
+    for shoots in
+        [&[(0.7, 3.0), (0.7, 3.0)][..], &[(0.58, 3.0); 3], &[(0.9, 3.0), (0.53, 3.0)], &[(0.8, 3.0)]]
+    {
+        let mesh = mesh(&self::shoots(shoots), 1e-3);
+        let (volume, closed) = solid(&mesh);
+        assert!(closed && volume > 0.0, "{shoots:?}");
+        let depths = depths(&mesh);
+        let width = |y: usize| depths[30 * y..30 * y + 30].iter().filter(|depth| depth.is_finite()).count();
+        let trunk = width(0);
+        for y in 0..20 {
+            assert!(width(y) + 1 >= trunk, "{shoots:?}: {} of {trunk} in row {y}", width(y));
+        }
+    }
+}
+
+/// A shoot that becomes wider beside another one changes the joint little by little: where it changes most, it changes the less the
+/// less the shoot grows.
+#[test]
+fn a_fork_does_not_jump_while_a_shoot_grows() {
+    let shape = |width: f64| (width, depths(&mesh(&shoots(&[(0.9, 3.0), (width, 3.0)]), 1e-3)));
+    let shapes: Vec<_> = (0..=24).map(|k| shape(0.3 + 0.4 * f64::from(k) / 24.0)).collect();
+    let steps = shapes.windows(2).map(|pair| change(&pair[0].1, &pair[1].1));
+    let most = steps.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).expect("steps").0;
+    let (mut low, mut high) = (shapes[most].clone(), shapes[most + 1].clone());
+    for _ in 0..8 {
+        let middle = shape(0.5 * (low.0 + high.0));
+        match change(&low.1, &middle.1) > change(&middle.1, &high.1) {
+            true => high = middle,
+            false => low = middle,
+        }
+    }
+    let jump = change(&low.1, &high.1);
+    assert!(jump < 0.004, "{jump} from {} to {}", low.0, high.0);
+}
