@@ -1,6 +1,6 @@
 //! Pulses: rates and values that are large for less than a step, wherever they stand. None is passed over, or integrated in part.
 
-use dlsys::sim::{Method, Scheduler, Settings};
+use dlsys::sim::{Method, Settings};
 
 use crate::common::run;
 use crate::evidence::{first_event, last_value};
@@ -257,25 +257,28 @@ fn no_pulse_of_many_is_integrated_by_chance() {
     }
 }
 
-/// A pulse in the rates of all cells of a filament in which cells have events all the time, so that some of them are integrated again around each.
+/// A pulse soon after the birth of each cell of a filament in which cells have events all the time: it is within what is integrated again around an
+/// event, and in no step of all cells. The reference has no pulse but what it adds, at birth.
 #[test]
 fn pulses_after_events_of_neighbours_are_seen() {
+    let added = 800.0 * 5e-5 * std::f64::consts::PI.sqrt();
     for n in 0..12 {
-        let at = 2.0 + (n as f64 * 0.0873) % 0.7;
-        let cells: String = (0..60).map(|i| format!(" F_v({:?}, 1)", (i as f64 * 0.618) % 1.0)).collect();
-        let text = format!(
-            "initial string: F_w(0, 2){cells} F_w(0, 2)\n\
-             F(u, l) < F_v(x, c) > F(v, r):\n  \
-               if x < 1 solve dx/dt = 1, dc/dt = 0.03*(l + r - 2c) + 0.1*sin(c) + 20*exp(-((t - {at:?})/0.002)^2)\n  \
-               if x = 1 produce F_v(0, 0.5*c + 0.4)"
-        );
-        let end = |scheduler, tolerance| {
-            let settings = Settings { scheduler, tolerance, ..Settings::default() };
-            run(&text, settings, &[3.0]).unwrap_or_else(|e| panic!("{e}\n{text}")).remove(0)
+        let at = 0.003 + 0.0004 * f64::from(n);
+        let end = |height: f64, first: f64, at_birth: f64| {
+            let cells: String =
+                (1..60).map(|i| format!(" F_v({:?}, 1)", (f64::from(i) * 0.618) % 1.0)).collect();
+            let text = format!(
+                "initial string: F_w(0, 2) F_v(0, {first}){cells} F_w(0, 2)\n\
+                 F(u, l) < F_v(x, c) > F(v, r):\n  \
+                   if x < 1 solve dx/dt = 1, dc/dt = 0.03*(l + r - 2c) + 0.1*sin(c) + {height}*exp(-((x - {at:?})/0.00005)^2)\n  \
+                   if x = 1 produce F_v(0, 0.5*c + {at_birth})"
+            );
+            run(&text, Settings::default(), &[1.9]).unwrap_or_else(|e| panic!("{e}\n{text}")).remove(0)
         };
-        let (found, reference) = (end(Scheduler::Auto, 1e-6), end(Scheduler::Global, 1e-8));
-        for (a, b) in found.iter().zip(&reference) {
-            assert!((a.1[1] - b.1[1]).abs() < 2e-5, "{a:?}, not {b:?}, at {at}\n{text}");
+        let (found, reference) = (end(800.0, 1.0, 0.4), end(0.0, 1.0 + added, 0.4 + added));
+        for (a, b) in found.iter().zip(&reference).filter(|(a, _)| a.1[0] > at + 0.0004) {
+            // What a cell has for `at` more does so much.
+            assert!((a.1[1] - b.1[1]).abs() < 0.3 * added * at, "{a:?}, not {b:?}, at {at}");
         }
     }
 }

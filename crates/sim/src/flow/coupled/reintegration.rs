@@ -38,7 +38,7 @@ use crate::world::coupled_solution::{CoupledSolution, value_of};
 use crate::world::neighbours::reads;
 use crate::world::prefetch::{fetch, is_large};
 use crate::world::state::{Control, State};
-use dlsys_ode::{Dense, Nodes};
+use dlsys_ode::Dense;
 use dlsys_tree::{ModuleId, SimTime};
 use smallvec::SmallVec;
 
@@ -62,6 +62,8 @@ pub struct Reintegration {
     trial: TrialSolution,
     /// The range of the region's components, in models whose rates may have pulses.
     range: RangeOfSteps,
+    /// The positions in the last region's time, from 0 to 1, at which its steps evaluated rates, in models whose rates may have pulses.
+    nodes: Vec<f64>,
     y: Vec<f64>,
     /// Id of the last traversal of modules.
     visit: u64,
@@ -88,7 +90,7 @@ struct StiffReach {
 impl Default for Reintegration {
     fn default() -> Reintegration {
         let (integrator, control, numbers, system, memory) = Default::default();
-        let (region, trial, range, y) = Default::default();
+        let (region, trial, range, nodes, y) = Default::default();
         Reintegration {
             integrator,
             control,
@@ -101,6 +103,7 @@ impl Default for Reintegration {
             region,
             trial,
             range,
+            nodes,
             y,
             visit: 0,
         }
@@ -108,9 +111,9 @@ impl Default for Reintegration {
 }
 
 impl Reintegration {
-    /// The positions in the last step, from 0 to 1, at which rates were evaluated.
-    pub fn nodes(&self) -> Nodes {
-        self.integrator.nodes()
+    /// The positions in the last region's time, from 0 to 1, at which its steps evaluated rates.
+    pub fn nodes(&self) -> &[f64] {
+        &self.nodes
     }
 
     /// Numbers the components of the last region.
@@ -347,7 +350,17 @@ impl FlowStage<'_, '_> {
         let solution = self.world.coupled.as_ref()?;
         let TrialSolution { stretches, components, rings } = trial;
         let Reintegration {
-            integrator, control, numbers, system, memory, range, y, reaches, strength, ..
+            integrator,
+            control,
+            numbers,
+            system,
+            memory,
+            range,
+            nodes,
+            y,
+            reaches,
+            strength,
+            ..
         } = &mut self.flows.coupled.reintegration;
         stretches.clear();
         components.clear();
@@ -400,6 +413,8 @@ impl FlowStage<'_, '_> {
         let may_pulse = self.setup.has_pulses;
         integrator.keep_reached(may_pulse);
         range.begin();
+        nodes.clear();
+        let room = solution.end.since(now);
         let mut from = now;
         while solution.end.since(from) > 0.0 {
             if stretches.len() >= MAX_STEPS {
@@ -414,7 +429,7 @@ impl FlowStage<'_, '_> {
             let settings = &self.setup.coupled_settings;
             let request = StepRequest { settings, y, start: from, limit: end };
             let step = integrator.step(request, control, &mut equations, stats);
-            from = step.ok()?;
+            let start = std::mem::replace(&mut from, step.ok()?);
             if system.algebra.is_empty() {
                 stretches.push(integrator.dense(&mut equations, y));
             } else {
@@ -425,6 +440,8 @@ impl FlowStage<'_, '_> {
             *memory = equations.memory;
             if may_pulse {
                 range.add(integrator.reached());
+                let place = |node: &f64| (start.since(now) + node * from.since(start)) / room;
+                nodes.extend(integrator.nodes().iter().map(place));
             }
             if let (Some(cause), 1) = (stiff, stretches.len()) {
                 reaches[cause as usize].first = stretches[0].h;

@@ -339,7 +339,7 @@ impl FlowStage<'_, '_> {
         let is_plain = self.flows.coupled.system.algebra.is_empty();
         self.flows.coupled.reintegration.number_components();
         let reintegration = &self.flows.coupled.reintegration;
-        let (nodes, stages) = (&*reintegration.nodes(), reintegration.stages().filter(|_| is_plain));
+        let (nodes, stages) = (reintegration.nodes(), reintegration.stages().filter(|_| is_plain));
         let overlooked = pulsing.into_iter().any(|id| {
             let step = examined_step(world, rules, id, self.instant.at, nodes, stages, how);
             step.is_some_and(|step| pulses.examine(&step) != PulseFinding::Clear)
