@@ -167,14 +167,19 @@ impl FrameWriter {
     /// # Errors
     /// Those of `out`.
     pub fn write_to(&self, scene: &Scene, title: &str, out: &mut (dyn Write + Send)) -> io::Result<()> {
-        // Pixels show no more detail than they have room for.
-        let flattened = match self.format.content() {
+        let content = self.format.content();
+        let flattened = match content {
             Content::Pixels => Cow::Borrowed(scene),
             Content::Vectors | Content::Mesh => scene.flattened(),
         };
-        let whole = self.fit.drawn(Cow::Borrowed(scene));
-        let scene = match self.format.content() {
-            Content::Pixels => self.fit.drawn(Cow::Borrowed(scene)),
+        // A mesh has no shadows.
+        let whole = match content {
+            Content::Pixels | Content::Vectors => self.fit.drawn(Cow::Borrowed(scene)),
+            Content::Mesh => Cow::Borrowed(scene),
+        };
+        let scene = match content {
+            // Pixels show no more detail than they have room for.
+            Content::Pixels => Cow::Borrowed(&*whole),
             // Nor do regions of them.
             Content::Vectors if self.fit.has_visible_regions() => {
                 let (fit, page) = self.fit.for_frame(&flattened, &self.page);

@@ -9,6 +9,9 @@ pub(crate) fn side_by_side<T: Send + Sync>(
     threads: usize,
     make: impl Fn(usize) -> T + Sync,
 ) -> Vec<T> {
+    if threads <= 1 || count <= 1 {
+        return (0..count).map(make).collect();
+    }
     let made: Vec<OnceLock<T>> = (0..count).map(|_| OnceLock::new()).collect();
     let next = AtomicUsize::new(0);
     let work = || {
