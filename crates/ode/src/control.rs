@@ -22,8 +22,8 @@ impl StepSettings {
     }
 
     /// The scheme for a step.
-    pub(crate) fn scheme(&self, is_stiff: bool, overhead_is_high: bool) -> Scheme {
-        let automatic = || Scheme::automatic(self.tolerance, is_stiff, overhead_is_high);
+    pub(crate) fn scheme(&self, is_stiff: bool, is_cut: bool) -> Scheme {
+        let automatic = || Scheme::automatic(self.tolerance, is_stiff, is_cut);
         self.method.scheme().unwrap_or_else(automatic)
     }
 }

@@ -89,8 +89,8 @@ pub struct Stepper {
     has_been_implicit: bool,
     /// The rates at the start of the next step are known.
     rate_is_known: bool,
-    /// The overhead of a step dominates the cost of its rates: `auto` prefers methods of high order.
-    pub overhead_is_high: bool,
+    /// Limits cut the steps shorter than step control would make them: `auto` prefers methods of low order.
+    pub is_cut: bool,
     /// Nothing is searched for inside steps, so that their interior need not be as exact as their ends; see [`Stepper::refined`].
     pub is_unwatched: bool,
     /// The range of the components at the stages is kept: [`Stepper::reached`].
@@ -223,7 +223,7 @@ impl Stepper {
         start: SimTime,
         limit: Option<SimTime>,
     ) -> Result<SimTime, Error> {
-        let scheme = settings.scheme(control.stiff, self.overhead_is_high);
+        let scheme = settings.scheme(control.stiff, self.is_cut);
         let facts = scheme.facts();
         let tolerance = settings.tolerance * facts.tolerance_share;
         self.scheme = Some(scheme);
@@ -462,7 +462,7 @@ impl Stepper {
         }
         let (mut y, mut from) = (y.to_vec(), whole.start);
         let mut control = Control { size: 0.5 * whole.h, error: self.error, ..Control::default() };
-        let mut shorter = Stepper { overhead_is_high: self.overhead_is_high, ..Stepper::default() };
+        let mut shorter = Stepper { is_cut: self.is_cut, ..Stepper::default() };
         shorter.restart(settings.method, y.len());
         let mut pieces = Vec::new();
         while whole.end.since(from) > 0.0 {

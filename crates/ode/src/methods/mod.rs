@@ -220,19 +220,18 @@ impl Method {
     }
 }
 
-/// Looser than this, many small steps of low order are cheaper than few of high order.
-const HIGH_ORDER_BELOW: f64 = 1e-7;
-/// The same where the overhead of a step dominates the cost of the rates.
-const HIGH_ORDER_BELOW_IF_OVERHEAD_IS_HIGH: f64 = 1e-5;
+/// Up to this tolerance few steps of high order are cheaper than many of low order: a step costs more than its rates.
+const HIGH_ORDER_UP_TO: f64 = 1e-4;
+/// The same where limits cut the steps, so that a higher order does not make them longer.
+const HIGH_ORDER_UP_TO_IF_CUT: f64 = 5e-8;
 
 impl Scheme {
-    /// What `auto` chooses for a step, given the tolerance of the run.
-    pub(crate) fn automatic(tolerance: f64, is_stiff: bool, overhead_is_high: bool) -> Scheme {
-        let high_order_below =
-            if overhead_is_high { HIGH_ORDER_BELOW_IF_OVERHEAD_IS_HIGH } else { HIGH_ORDER_BELOW };
+    /// What `auto` chooses for a step, given the tolerance of the run, and whether limits cut the steps.
+    pub(crate) fn automatic(tolerance: f64, is_stiff: bool, is_cut: bool) -> Scheme {
+        let high_order_up_to = if is_cut { HIGH_ORDER_UP_TO_IF_CUT } else { HIGH_ORDER_UP_TO };
         if is_stiff {
             Scheme::Radau
-        } else if tolerance < high_order_below {
+        } else if tolerance <= high_order_up_to {
             Scheme::Dop853
         } else {
             Scheme::Dopri5

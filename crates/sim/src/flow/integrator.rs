@@ -47,9 +47,9 @@ impl Integrator {
         self.stepper.restart(method, n);
     }
 
-    /// Prefers methods of high order: the overhead of a step dominates the cost of its rates.
-    pub fn expect_high_overhead(&mut self) {
-        self.stepper.overhead_is_high = true;
+    /// Prefers methods of low order: the limits of steps are nearer than step control would go.
+    pub fn expect_cuts(&mut self) {
+        self.stepper.is_cut = true;
     }
 
     /// Declares whether steps are free of searches for events. The dense output of such unwatched steps is refined for

@@ -89,7 +89,10 @@ struct StiffReach {
 
 impl Default for Reintegration {
     fn default() -> Reintegration {
-        let (integrator, control, numbers, system, memory) = Default::default();
+        let mut integrator = Integrator::default();
+        // The end of the common step limits them.
+        integrator.expect_cuts();
+        let (control, numbers, system, memory) = Default::default();
         let (region, trial, range, nodes, y) = Default::default();
         Reintegration {
             integrator,

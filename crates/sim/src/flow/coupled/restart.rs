@@ -112,7 +112,6 @@ impl FlowStage<'_, '_> {
             .then(|| Linear::new(system, rules, y, self.setup.coupled_settings.tolerance))
             .flatten();
         // After each step all members are searched.
-        integrator.expect_high_overhead();
         let is_unwatched =
             rules.iter().all(|rule| rule.atoms.is_empty()) && pulsing.is_empty() && system.algebra.is_empty();
         integrator.set_unwatched(is_unwatched);
