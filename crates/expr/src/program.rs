@@ -355,8 +355,17 @@ impl Program {
         if scratch.len() < self.registers {
             scratch.resize(self.registers, T::constant(0.0));
         }
-        // What earlier evaluations have left in the other registers is overwritten before it is read.
         scratch[..self.variables].copy_from_slice(&variables[..self.variables]);
+        self.eval_in(scratch, out);
+    }
+
+    /// Evaluates all roots, as [`Program::eval`] does, with the variables in the first registers, which stay there.
+    pub fn eval_in<T: Value>(&self, registers: &mut Scratch<T>, out: &mut [T]) {
+        // What earlier evaluations have left in the other registers is overwritten before it is read.
+        if registers.len() < self.registers {
+            registers.resize(self.registers, T::constant(0.0));
+        }
+        let scratch = &mut registers[..self.registers];
         for &instruction in &self.code {
             let (to, value) = match instruction {
                 Instruction::Const(to, x) => (to, T::constant(x)),

@@ -87,9 +87,9 @@ impl Workspace {
             least.copy_from_slice(&self.from[..n]);
             greatest.copy_from_slice(&self.from[..n]);
         }
-        for ((least, greatest), value) in least.iter_mut().zip(greatest).zip(&self.stage) {
-            *least = least.min(*value);
-            *greatest = greatest.max(*value);
+        for (component, value) in self.stage[..n].iter().enumerate() {
+            least[component] = least[component].min(*value);
+            greatest[component] = greatest[component].max(*value);
         }
     }
 

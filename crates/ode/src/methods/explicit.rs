@@ -209,6 +209,7 @@ fn weigh<W: Weights>(k: &Parts<'_>, block: usize) -> [f64; PART] {
 #[inline(always)]
 fn weighed<W: Weights>(k: &[Vec<f64>], component: usize) -> f64 {
     let mut sum = 0.0;
+    let k = &k[..W::WEIGHTS.len()];
     for (weight, k) in W::WEIGHTS.iter().zip(k) {
         if *weight != 0.0 {
             sum += weight * k[component];
@@ -268,8 +269,8 @@ impl Workspace {
     fn combine<W: Weights>(&mut self, n: usize, h: f64) {
         let Workspace { from, stage, k, .. } = self;
         if n <= FEW {
-            for (j, (s, y)) in stage.iter_mut().zip(from).enumerate().take(n) {
-                *s = *y + h * weighed::<W>(k, j);
+            for j in 0..n {
+                stage[j] = from[j] + h * weighed::<W>(k, j);
             }
             return;
         }

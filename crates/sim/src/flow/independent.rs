@@ -35,7 +35,7 @@ pub fn crawls(mark: &mut SimTime, since_mark: &mut usize, at: SimTime) -> bool {
 struct Independent<'a> {
     solve: &'a Solve,
     program: &'a Program,
-    /// All variables of the rule; those that move are filled in for each evaluation.
+    /// The registers of the program: first all variables of the rule, of which those that move are filled in for each evaluation.
     variables: Vec<f64>,
     /// The index of each component among the variables.
     numeric: SmallVec<[usize; 4]>,
@@ -123,7 +123,7 @@ const MAX_TRIES: usize = 100;
 impl Rates for Independent<'_> {
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
         self.move_to(tau, y);
-        self.program.eval(&self.variables, &mut self.scratch, out);
+        self.program.eval_in(&mut self.variables, out);
     }
 
     fn couplings(&self) -> Vec<(u32, u32)> {
