@@ -31,7 +31,7 @@ pub use control::{CERTAINTY, Control, StepSettings, next_grid_time};
 pub use dense::{Coefficients, Dense, MAX_DEGREE};
 pub use error::Error;
 pub use methods::Method;
-pub use one_step::{InteriorError, Nodes, OneStep, Step, Trial};
+pub use one_step::{InteriorError, OneStep, Step, Trial};
 pub use rates::Rates;
 pub use roots::{Function, Root, first_root};
 pub use sparse::{Complex, Field, Pattern, Wide};

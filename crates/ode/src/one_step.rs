@@ -9,9 +9,6 @@ use crate::dense::Dense;
 use crate::workspace::Workspace;
 use dlsys_expr::SimTime;
 
-/// Positions in a step, as fractions of it, from 0 to 1.
-pub type Nodes = smallvec::SmallVec<[f64; 12]>;
-
 /// The outcome of a trial step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trial {
@@ -80,8 +77,8 @@ pub trait OneStep {
         self.error_order()
     }
 
-    /// Where in a step the rates are evaluated that its error estimate depends on.
-    fn nodes(&self) -> Nodes;
+    /// Where in a step the rates are evaluated that its error estimate depends on, as fractions of it, from 0 to 1.
+    fn nodes(&self) -> &[f64];
 
     /// Tries a step, whose rates at the start are known to the workspace; leaves its end there.
     fn attempt(

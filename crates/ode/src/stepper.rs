@@ -3,7 +3,7 @@
 use crate::control::{CERTAINTY, Control, Powerless, StepSettings, fit, growth, next_grid_time, shrinkage};
 use crate::dense::Dense;
 use crate::methods::{Scheme, Schemes};
-use crate::one_step::{InteriorError, Nodes, Step, Trial};
+use crate::one_step::{InteriorError, Step, Trial};
 use crate::rates::Shifted;
 use crate::workspace::Workspace;
 use crate::{Error, Method, Rates};
@@ -165,8 +165,8 @@ impl Stepper {
         self.schemes.forget();
     }
 
-    /// Where in the step just made rates were evaluated that its error estimate depends on.
-    pub fn nodes(&self) -> Nodes {
+    /// Where in the step just made rates were evaluated that its error estimate depends on, as fractions of it.
+    pub fn nodes(&self) -> &[f64] {
         self.schemes.nodes(self.scheme())
     }
 

@@ -10,7 +10,7 @@
 use super::dop853::join_estimates;
 use crate::Rates;
 use crate::dense::Dense;
-use crate::one_step::{InteriorError, Nodes, OneStep, Step, Trial};
+use crate::one_step::{InteriorError, OneStep, Step, Trial};
 use crate::workspace::{FLOOR, MAX_STAGES, PART, Workspace, part};
 use dlsys_expr::SimTime;
 use std::marker::PhantomData;
@@ -76,11 +76,17 @@ pub trait Pair: Clone {
 
 /// The one-step method of a pair.
 #[derive(Clone, Debug)]
-pub struct Explicit<P>(PhantomData<P>);
+pub struct Explicit<P> {
+    /// The nodes whose rates have a weight in the error estimate.
+    nodes: Vec<f64>,
+    pair: PhantomData<P>,
+}
 
-impl<P> Default for Explicit<P> {
+impl<P: Pair> Default for Explicit<P> {
     fn default() -> Explicit<P> {
-        Explicit(PhantomData)
+        let counts = |(_, weight): &(&f64, &f64)| **weight != 0.0;
+        let nodes = P::TABLEAU.c.iter().zip(P::TABLEAU.e[0]).filter(counts).map(|(c, _)| *c).collect();
+        Explicit { nodes, pair: PhantomData }
     }
 }
 
@@ -92,9 +98,8 @@ impl<P: Pair> OneStep for Explicit<P> {
         P::TABLEAU.error_order
     }
 
-    fn nodes(&self) -> Nodes {
-        let counts = |(_, weight): &(&f64, &f64)| **weight != 0.0;
-        P::TABLEAU.c.iter().zip(P::TABLEAU.e[0]).filter(counts).map(|(c, _)| *c).collect()
+    fn nodes(&self) -> &[f64] {
+        &self.nodes
     }
 
     fn attempt(

@@ -13,7 +13,7 @@ mod rk4;
 
 use crate::Rates;
 use crate::dense::Dense;
-use crate::one_step::{InteriorError, Nodes, OneStep, Step, Trial};
+use crate::one_step::{InteriorError, OneStep, Step, Trial};
 use crate::workspace::Workspace;
 use dlsys_expr::SimTime;
 use explicit::Explicit;
@@ -92,7 +92,7 @@ macro_rules! methods {
                 match scheme { $(Scheme::$variant => self.$field.starting_order(),)* }
             }
 
-            pub fn nodes(&self, scheme: Scheme) -> Nodes {
+            pub fn nodes(&self, scheme: Scheme) -> &[f64] {
                 match scheme { $(Scheme::$variant => self.$field.nodes(),)* }
             }
 

@@ -15,82 +15,13 @@
 //!
 //! The test is one evaluation of the terms. Most steps that accuracy has made short pass it; others are examined piece by piece ([`pulse`](super::pulse)).
 
-use crate::detect::pulse::ExaminedStep;
+use crate::detect::examined::{ExaminedStep, StageRange};
 use crate::trajectory::Trajectory;
 use crate::world::state::State;
 use dlsys_expr::{Interval, Scratch, Smooth, Value};
-use dlsys_ode::Reached;
 
 /// What the terms may differ by, times the length of the step, in tolerances: as much as the error of a step may be.
 const SHARE: f64 = 0.1;
-
-/// The range of integrated variables at the stages of a step, or of several end to end.
-#[derive(Clone, Copy)]
-pub struct StageRange<'p> {
-    pub reached: Reached<'p>,
-    /// By component of the coupled solution: its number in the step. Those that are not in the step, with a number beyond, are its inputs along their dense output. None if
-    /// they are numbered alike.
-    pub numbers: Option<&'p [u32]>,
-}
-
-/// The range of the components over steps end to end.
-#[derive(Clone, Default)]
-pub struct RangeOfSteps {
-    least: Vec<f64>,
-    greatest: Vec<f64>,
-    steps: usize,
-    is_known: bool,
-}
-
-impl RangeOfSteps {
-    /// Begins with the first of other steps.
-    pub fn begin(&mut self) {
-        (self.steps, self.is_known) = (0, true);
-    }
-
-    /// Includes a step, if its range is known.
-    pub fn add(&mut self, step: Option<Reached>) {
-        let Some(Reached { least, greatest }) = step else {
-            self.is_known = false;
-            return;
-        };
-        if self.steps == 0 {
-            self.least.clear();
-            self.greatest.clear();
-            self.least.extend_from_slice(least);
-            self.greatest.extend_from_slice(greatest);
-        }
-        self.least.iter_mut().zip(least).for_each(|(known, new)| *known = known.min(*new));
-        self.greatest.iter_mut().zip(greatest).for_each(|(known, new)| *known = known.max(*new));
-        self.steps += 1;
-    }
-
-    /// The range of all of them, if it is known.
-    pub fn stages<'r>(&'r self, numbers: &'r [u32]) -> Option<StageRange<'r>> {
-        let reached = Reached { least: &self.least, greatest: &self.greatest };
-        (self.is_known && self.steps > 0).then_some(StageRange { reached, numbers: Some(numbers) })
-    }
-}
-
-impl<'p> StageRange<'p> {
-    /// The range of a step whose components are numbered as they are known.
-    pub fn of_step(reached: Reached<'p>) -> StageRange<'p> {
-        StageRange { reached, numbers: None }
-    }
-
-    /// The range of a component whose dense output has these bounds.
-    fn with(&self, component: u32, bounds: Interval) -> Smooth {
-        let number = match self.numbers {
-            Some(numbers) => numbers.get(component as usize).copied().unwrap_or(u32::MAX),
-            None => component,
-        };
-        match self.reached.of(number as usize) {
-            Some((lo, hi)) => Smooth::spanned(bounds.lo.min(lo), bounds.hi.max(hi)),
-            None if self.numbers.is_some() => Smooth::spanned(bounds.lo, bounds.hi),
-            None => Smooth::UNKNOWN,
-        }
-    }
-}
 
 /// Tests steps; the fields are working memory.
 #[derive(Clone, Debug, Default)]
@@ -105,10 +36,10 @@ impl CalmTest {
     pub fn is_calm(&mut self, step: &ExaminedStep) -> bool {
         let pulses = &step.solve.pulses;
         let has_values = pulses.values.terms.outputs() > 0;
-        if step.sliced || has_values || !step.rule.aggregates.is_empty() {
+        if step.conditions.sliced || has_values || !step.rule.aggregates.is_empty() {
             return false;
         }
-        let Some(stages) = step.stages else { return false };
+        let Some(stages) = step.stages.range else { return false };
         self.gather(step, stages);
         let h = step.end.since(step.start);
         let formulas = step.state.numeric_only.then_some(&pulses.formula_rates);
@@ -116,7 +47,7 @@ impl CalmTest {
             self.terms.resize(all.terms.outputs(), Smooth::UNKNOWN);
             all.terms.eval(&self.variables, &mut self.scratch, &mut self.terms);
             // The others stand inside of these.
-            self.terms[..all.outer].iter().all(|term| term.misfit * h <= SHARE * step.tolerance)
+            self.terms[..all.outer].iter().all(|term| term.misfit * h <= SHARE * step.conditions.tolerance)
         })
     }
 

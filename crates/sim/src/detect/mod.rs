@@ -4,12 +4,14 @@
 //! - [`crossing`]: the crossings of one atom, by formula or by root isolation
 //! - [`doubt`]: crossings that the error of integration may hide or feign
 //! - [`quiet`]: a short test that spares most searches
-//! - [`pulse`]: rates that are large between the stages of a step; [`calm`]: a short test that spares most of that
+//! - [`pulse`]: rates that are large between the stages of a step; [`calm`]: a short test that spares most of that;
+//!   [`examined`]: what both are told of a step
 //! - [`signs`]: signs of the differences that conditions compare, and their consequences
 
 pub mod calm;
 pub mod crossing;
 pub mod doubt;
+pub mod examined;
 pub mod pulse;
 pub mod quiet;
 pub mod search;

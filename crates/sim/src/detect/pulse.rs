@@ -28,15 +28,13 @@
 
 use smallvec::SmallVec;
 
-use crate::detect::calm::{CalmTest, StageRange};
+use crate::detect::calm::CalmTest;
+use crate::detect::examined::{ExaminedStep, exceeds};
 use crate::trajectory::Trajectory;
-use crate::world::World;
 use crate::world::course::Course;
 use crate::world::path::Path;
-use crate::world::state::State;
 use dlsys_expr::{Dual, Held, Interval, Program, Scratch};
-use dlsys_model::{PulseTerms, Rule, Solve};
-use dlsys_ode::Dense;
+use dlsys_model::PulseTerms;
 use dlsys_tree::{ModuleId, SimTime};
 
 /// A pulse may be overlooked where the bounds of a term go beyond its range at the stages by this many times that range; in stiff equations, where they are
@@ -44,9 +42,6 @@ use dlsys_tree::{ModuleId, SimTime};
 const SURPRISE: f64 = 8.0;
 /// Positions between the stages of all methods at which rates are compared with those of the dense output.
 const BETWEEN: [f64; 2] = [0.16, 0.55];
-/// The difference of these rates that is no surprise, times the length of the step, in tolerances. Smooth rates have differences up to 4, fast waves 12;
-/// a step over a pulse has some hundreds.
-const DEFECT: f64 = 20.0;
 /// Pieces narrower than this part of a step are not halved any more.
 const NARROW: f64 = 1.0 / 256.0;
 /// Most pieces of a step that are examined.
@@ -73,48 +68,6 @@ impl PulseFinding {
             PulseFinding::Overlooked(at) | PulseFinding::Unbounded(at) => at,
         };
         if at(other) < at(self) { other } else { self }
-    }
-}
-
-/// A step of a module's equations that is to be examined.
-#[derive(Clone, Copy)]
-pub struct ExaminedStep<'p> {
-    /// The world before the step, with the solution of the coupled modules.
-    pub world: &'p World,
-    /// The rules of the model.
-    pub rules: &'p [Rule],
-    /// The module, its rule and its active equations.
-    pub state: &'p State,
-    /// See `state`.
-    pub rule: &'p Rule,
-    /// See `state`.
-    pub solve: &'p Solve,
-    /// The instants between which rates are bounded.
-    pub start: SimTime,
-    /// See `start`.
-    pub end: SimTime,
-    /// The positions in the step at which the method has evaluated rates, from 0 to 1.
-    pub nodes: &'p [f64],
-    /// The dense output, if the module is integrated alone; else it is that of the coupled modules.
-    pub own: Option<&'p Dense>,
-    /// The range of the components at the stages, if it is known.
-    pub stages: Option<StageRange<'p>>,
-    /// The largest contribution to the values that may be overlooked.
-    pub tolerance: f64,
-    /// The equations are stiff.
-    pub stiff: bool,
-    /// Neighbours were constant while the step was made.
-    pub sliced: bool,
-}
-
-impl<'p> ExaminedStep<'p> {
-    fn course(&self) -> Course<'p> {
-        Course::new(self.world, self.state, self.rule, self.own)
-    }
-
-    /// True if a value, or a rate times the length of the step, differs from that of the dense output by more than it does where all is smooth.
-    fn is_far(&self, a: f64, b: f64, size: f64) -> bool {
-        exceeds((a - b).abs(), DEFECT * self.tolerance * size.abs().max(1.0))
     }
 }
 
@@ -184,7 +137,7 @@ impl PulseDetector {
             first =
                 first.earlier(self.examine_terms(&Examination { step, course, terms, scale, reader: None }));
         }
-        if first == PulseFinding::Clear && !step.stiff && !step.sliced {
+        if first == PulseFinding::Clear && !step.conditions.stiff && !step.conditions.sliced {
             first = along(step, |path, _| self.examine_between(step, course, path));
         }
         let mut offset = step.world.tree.parameters(step.state.id).len();
@@ -202,7 +155,7 @@ impl PulseDetector {
     fn examine_between(&mut self, step: &ExaminedStep, course: &Course, path: &Path) -> PulseFinding {
         let has_values = step.solve.pulses.values.terms.outputs() > 0;
         // A value that a stage has met need not be that of the dense output.
-        let stages = if has_values { step.nodes } else { &[] };
+        let stages = if has_values { step.stages.nodes } else { &[] };
         for position in BETWEEN.iter().chain(stages) {
             let at = path.start.after(position * path.h);
             course.at(at, &mut self.values);
@@ -251,7 +204,7 @@ impl PulseDetector {
     ) -> PulseFinding {
         let Some(state) = step.world.state(id) else { return PulseFinding::Clear };
         let Some((rule, solve)) = state.rule.zip(state.solve) else { return PulseFinding::Clear };
-        let rule = &step.rules[rule];
+        let rule = &step.conditions.rules[rule];
         let (solve, terms) = (&rule.solves[solve], &rule.solves[solve].pulses.values);
         let follows =
             |p: &usize| state.trajectories.get(*p).is_some_and(|law| matches!(law, Trajectory::Function(_)));
@@ -284,7 +237,7 @@ impl PulseDetector {
         let (step, program) = (all.step, &all.terms.terms);
         let h = step.end.since(step.start);
         self.out.resize(program.outputs(), 0.0);
-        let nodes = if up_to == Sampled::Ends { &[0.0, 1.0][..] } else { step.nodes };
+        let nodes = if up_to == Sampled::Ends { &[0.0, 1.0][..] } else { step.stages.nodes };
         for node in nodes {
             all.course.at(step.start.after(node * h), &mut self.values);
             program.eval(&self.values, &mut self.scratch, &mut self.out);
@@ -330,13 +283,13 @@ impl PulseDetector {
 
     /// True if the bounds of some term over a piece of a path allow for a pulse that no stage has seen.
     fn is_surprised(&mut self, all: &Examination, path: &Path, part: f64, (lo, hi): (f64, f64)) -> bool {
-        let (share, tolerance) = (part * (hi - lo), all.step.tolerance);
+        let (share, tolerance) = (part * (hi - lo), all.step.conditions.tolerance);
         (0..self.bounds_out.len()).any(|term| {
             let bounds = self.bounds_out[term];
             let is_outer = term < all.terms.outer && all.reader.is_none();
             if is_outer
                 && (bounds.hi - bounds.lo).max(0.0) * all.scale * share <= tolerance
-                && !all.step.stiff
+                && !all.step.conditions.stiff
             {
                 return false;
             }
@@ -348,8 +301,8 @@ impl PulseDetector {
             for sampled in [Sampled::Ends, Sampled::Stages] {
                 self.sample(all, sampled);
                 let range = self.ranges[term];
-                let usual = if all.step.stiff { range.magnitude() } else { range.hi - range.lo };
-                excess = match all.step.stiff {
+                let usual = if all.step.conditions.stiff { range.magnitude() } else { range.hi - range.lo };
+                excess = match all.step.conditions.stiff {
                     true => (bounds.hi.max(0.0), (-bounds.lo).max(0.0)),
                     false => (bounds.hi - range.hi, range.lo - bounds.lo),
                 };
@@ -436,11 +389,6 @@ impl PulseDetector {
             }
         }
     }
-}
-
-/// True if a number is larger than another, or one of them is none.
-fn exceeds(a: f64, b: f64) -> bool {
-    a.partial_cmp(&b).is_none_or(|order| order.is_gt())
 }
 
 /// The largest difference of two lists; infinite where one of them has no number.

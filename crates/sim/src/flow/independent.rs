@@ -1,8 +1,8 @@
 //! Independent modules: those that read no integrated neighbour are integrated alone, each with steps of its own.
 
 use crate::detect::Detector;
-use crate::detect::calm::StageRange;
-use crate::detect::pulse::{ExaminedStep, MAX_UNBOUNDED, PulseFinding};
+use crate::detect::examined::{Conditions, ExaminedStep, Stages};
+use crate::detect::pulse::{MAX_UNBOUNDED, PulseFinding};
 use crate::error::Error;
 use crate::flow::FlowStage;
 use crate::flow::integrator::{StepError, StepRequest};
@@ -256,23 +256,10 @@ impl FlowStage<'_, '_> {
             if !pulses || tries > MAX_TRIES {
                 break step;
             }
-            let (world, tolerance) = (&*self.world, self.setup.settings.tolerance);
-            let (nodes, start, end, own) = (&*integrator.nodes(), from, dense.end, Some(dense));
-            let examined = ExaminedStep {
-                world,
-                rules: &self.setup.model.rules,
-                state,
-                rule,
-                solve,
-                start,
-                end,
-                nodes,
-                own,
-                stages: integrator.reached().map(StageRange::of_step),
-                tolerance,
-                stiff,
-                sliced: self.setup.settings.is_sliced(),
-            };
+            let conditions = Conditions::new(&self.setup.model.rules, &self.setup.settings, stiff);
+            let stages = Stages::of(integrator);
+            let examined = ExaminedStep::alone(self.world, id, dense, stages, conditions);
+            let Some(examined) = examined else { break step };
             match overlooked(self.detector, &examined, index, tries) {
                 Some(at) if dense.h > least => {
                     stats.rejected += 1;

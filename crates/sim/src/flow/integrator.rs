@@ -4,7 +4,7 @@
 use crate::flow::coupled::algebra::AlgebraicError;
 use crate::flow::coupled::equations::Equations;
 use crate::{Settings, Stats};
-use dlsys_ode::{Control, Dense, Method, Nodes, Rates, Reached, StepSettings, Stepper};
+use dlsys_ode::{Control, Dense, Method, Rates, Reached, StepSettings, Stepper};
 use dlsys_tree::SimTime;
 
 pub use dlsys_ode::{CERTAINTY, Error as StepError, next_grid_time};
@@ -75,7 +75,7 @@ impl Integrator {
 
     /// The positions in the step just made, from 0 to 1, at which the rates were evaluated that its error estimate
     /// depends on.
-    pub fn nodes(&self) -> Nodes {
+    pub fn nodes(&self) -> &[f64] {
         self.stepper.nodes()
     }
 

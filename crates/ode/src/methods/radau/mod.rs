@@ -14,7 +14,7 @@ mod stages;
 
 use crate::Rates;
 use crate::dense::Dense;
-use crate::one_step::{InteriorError, Nodes, OneStep, Step, Trial};
+use crate::one_step::{InteriorError, OneStep, Step, Trial};
 use crate::sparse::Pattern;
 use crate::workspace::{FLOOR, Workspace};
 use dlsys_expr::{Dual, SimTime};
@@ -116,10 +116,8 @@ impl OneStep for Radau {
         4
     }
 
-    fn nodes(&self) -> Nodes {
-        self.stages
-            .as_ref()
-            .map_or_else(|| Nodes::from_slice(&[0.0, 0.5, 1.0]), |stages| Nodes::from_slice(stages.nodes()))
+    fn nodes(&self) -> &[f64] {
+        self.stages.as_ref().map_or(&[0.0, 0.5, 1.0], |stages| stages.nodes())
     }
 
     fn attempt(

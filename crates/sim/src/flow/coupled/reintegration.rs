@@ -26,7 +26,7 @@
 //! component as L. Where values diffuse, influence reaches as far as the square root of the time, and falls faster than
 //! exponentially beyond that.
 
-use crate::detect::calm::{RangeOfSteps, StageRange};
+use crate::detect::examined::{Stages, StagesOfSteps};
 use crate::flow::FlowStage;
 use crate::flow::coupled::columns::{Numbers, Whole};
 use crate::flow::coupled::equations::{Equations, RateWorkspace};
@@ -60,10 +60,8 @@ pub struct Reintegration {
     memory: RateWorkspace,
     region: Region,
     trial: TrialSolution,
-    /// The range of the region's components, in models whose rates may have pulses.
-    range: RangeOfSteps,
-    /// The positions in the last region's time, from 0 to 1, at which its steps evaluated rates, in models whose rates may have pulses.
-    nodes: Vec<f64>,
+    /// The stages of the last region's steps, in models whose rates may have pulses.
+    stages: StagesOfSteps,
     y: Vec<f64>,
     /// Id of the last traversal of modules.
     visit: u64,
@@ -93,7 +91,7 @@ impl Default for Reintegration {
         // The end of the common step limits them.
         integrator.expect_cuts();
         let (control, numbers, system, memory) = Default::default();
-        let (region, trial, range, nodes, y) = Default::default();
+        let (region, trial, stages, y) = Default::default();
         Reintegration {
             integrator,
             control,
@@ -105,8 +103,7 @@ impl Default for Reintegration {
             memory,
             region,
             trial,
-            range,
-            nodes,
+            stages,
             y,
             visit: 0,
         }
@@ -114,11 +111,6 @@ impl Default for Reintegration {
 }
 
 impl Reintegration {
-    /// The positions in the last region's time, from 0 to 1, at which its steps evaluated rates.
-    pub fn nodes(&self) -> &[f64] {
-        &self.nodes
-    }
-
     /// Numbers the components of the last region.
     pub fn number_components(&mut self) {
         self.numbers.put(&self.trial.components);
@@ -129,9 +121,9 @@ impl Reintegration {
         self.numbers.take_back(&self.trial.components);
     }
 
-    /// The range of the components at the stages of all steps of the last region, while they are numbered.
-    pub fn stages(&self) -> Option<StageRange<'_>> {
-        self.range.stages(self.numbers.all())
+    /// The stages of all steps of the last region, while its components are numbered.
+    pub fn stages(&self) -> Stages<'_> {
+        self.stages.all(self.numbers.all())
     }
 
     /// Evaluations of one module's equations so far.
@@ -353,17 +345,7 @@ impl FlowStage<'_, '_> {
         let solution = self.world.coupled.as_ref()?;
         let TrialSolution { stretches, components, rings } = trial;
         let Reintegration {
-            integrator,
-            control,
-            numbers,
-            system,
-            memory,
-            range,
-            nodes,
-            y,
-            reaches,
-            strength,
-            ..
+            integrator, control, numbers, system, memory, stages, y, reaches, strength, ..
         } = &mut self.flows.coupled.reintegration;
         stretches.clear();
         components.clear();
@@ -415,8 +397,7 @@ impl FlowStage<'_, '_> {
         }
         let may_pulse = self.setup.has_pulses;
         integrator.keep_reached(may_pulse);
-        range.begin();
-        nodes.clear();
+        stages.begin();
         let room = solution.end.since(now);
         let mut from = now;
         while solution.end.since(from) > 0.0 {
@@ -442,9 +423,7 @@ impl FlowStage<'_, '_> {
             }
             *memory = equations.memory;
             if may_pulse {
-                range.add(integrator.reached());
-                let place = |node: &f64| (start.since(now) + node * from.since(start)) / room;
-                nodes.extend(integrator.nodes().iter().map(place));
+                stages.add(integrator, start.since(now) / room, from.since(now) / room);
             }
             if let (Some(cause), 1) = (stiff, stretches.len()) {
                 reaches[cause as usize].first = stretches[0].h;

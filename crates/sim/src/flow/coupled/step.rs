@@ -1,8 +1,8 @@
 //! The common step of the coupled modules, and the search for the next event of each member.
 
-use crate::detect::calm::StageRange;
 use crate::detect::crossing::needs_search;
-use crate::detect::pulse::{ExaminedStep, MAX_UNBOUNDED, PulseFinding};
+use crate::detect::examined::{Conditions, ExaminedStep, Stages};
+use crate::detect::pulse::{MAX_UNBOUNDED, PulseFinding};
 use crate::detect::quiet::Outlook;
 use crate::error::Error;
 use crate::flow::FlowStage;
@@ -155,18 +155,11 @@ impl FlowStage<'_, '_> {
         let Coupled { integrator, control, pulsing, .. } = &self.flows.coupled;
         let settings = &self.setup.coupled_settings;
         let stiff = control.stiff || settings.method.is_implicit();
-        let nodes = integrator.nodes();
+        let conditions = Conditions::new(&self.setup.model.rules, settings, stiff);
+        let end = self.world.coupled.as_ref().map_or(from, |solution| solution.end);
+        let (span, stages) = ([from, end], Stages::of(integrator));
         let overlooked = pulsing.iter().filter_map(|id| {
-            let how = (settings.tolerance, stiff, settings.is_sliced());
-            let step = examined_step(
-                self.world,
-                &self.setup.model.rules,
-                *id,
-                from,
-                &nodes,
-                integrator.reached().map(StageRange::of_step),
-                how,
-            )?;
+            let step = ExaminedStep::coupled(self.world, *id, span, stages, conditions)?;
             match self.detector.pulses.examine(&step) {
                 PulseFinding::Clear => None,
                 PulseFinding::Overlooked(at) => Some(at),
@@ -333,15 +326,19 @@ impl FlowStage<'_, '_> {
         }
         let pulsing: Vec<ModuleId> = members.iter().copied().filter(|id| self.may_pulse(*id)).collect();
         let settings = &self.setup.coupled_settings;
-        let how = (settings.tolerance, self.flows.coupled.control.stiff, settings.is_sliced());
-        let (world, rules, pulses) = (&self.world, &self.setup.model.rules, &mut self.detector.pulses);
+        let Some(solution) = &self.world.coupled else { return false };
+        let span = [self.instant.at, solution.end];
+        let stiff = self.flows.coupled.control.stiff;
+        let conditions = Conditions::new(&self.setup.model.rules, settings, stiff);
         // Values that are solved for are no polynomials, though their dense output is.
         let is_plain = self.flows.coupled.system.algebra.is_empty();
         self.flows.coupled.reintegration.number_components();
         let reintegration = &self.flows.coupled.reintegration;
-        let (nodes, stages) = (reintegration.nodes(), reintegration.stages().filter(|_| is_plain));
+        let mut stages = reintegration.stages();
+        stages.range = stages.range.filter(|_| is_plain);
+        let (world, pulses) = (&self.world, &mut self.detector.pulses);
         let overlooked = pulsing.into_iter().any(|id| {
-            let step = examined_step(world, rules, id, self.instant.at, nodes, stages, how);
+            let step = ExaminedStep::coupled(world, id, span, stages, conditions);
             step.is_some_and(|step| pulses.examine(&step) != PulseFinding::Clear)
         });
         self.flows.coupled.reintegration.forget_components();
@@ -373,34 +370,4 @@ fn common<'s>(
     let mut equations = Equations::new(system, rules, None);
     equations.whole = whole;
     equations
-}
-
-/// The common step of a coupled module, from an instant to the end of the coupled solution.
-fn examined_step<'p>(
-    world: &'p World,
-    rules: &'p [Rule],
-    id: ModuleId,
-    start: SimTime,
-    nodes: &'p [f64],
-    stages: Option<StageRange<'p>>,
-    (tolerance, stiff, sliced): (f64, bool, bool),
-) -> Option<ExaminedStep<'p>> {
-    let state = world.state(id)?;
-    let rule = &rules[state.rule?];
-    let (solve, end) = (&rule.solves[state.solve?], world.coupled.as_ref()?.end);
-    Some(ExaminedStep {
-        world,
-        rules,
-        state,
-        rule,
-        solve,
-        start,
-        end,
-        nodes,
-        own: None,
-        stages,
-        tolerance,
-        stiff,
-        sliced,
-    })
 }
