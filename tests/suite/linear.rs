@@ -188,3 +188,34 @@ fn linear_neighbours_are_followed_without_steps() {
     let string = run(turning, settings, &[10.0]).expect("runs").remove(0);
     assert!((string[0].1[0] - 10f64.cos()).abs() < 1e-10 && (string[1].1[0] - 10f64.sin()).abs() < 1e-10);
 }
+
+/// What flows in by a formula, a power of time and two exponentials here, is solved along with the cells: c' = s + p - 3c and d' = c - d
+/// with s = exp(-t) - exp(-2t) / 2 and p = 2 + t + t²/2. One step would be needed at least otherwise.
+#[test]
+fn formulas_flow_into_linear_neighbours_without_steps() {
+    let text = "initial string: A(1, 0.5, 1, 2) C(1) D(0)\n\
+                A(m, s, q, p): solve dm/dt = -m, ds/dt = m - 2*s, dq/dt = 1, dp/dt = q\n\
+                A(m, s, q, p) < C(c): solve dc/dt = s + p - 3*c\n\
+                C(c) < D(d): solve dd/dt = c - d";
+    let (x, y, z) = (1.0 / 6.0, 2.0 / 9.0, 16.0 / 27.0);
+    let fades = 1.0 - (0.5 - 0.5 + z);
+    let (v, w) = (y - 2.0 * x, z - (y - 2.0 * x));
+    let exact = |t: f64| {
+        let [one, two, three] = [1.0, 2.0, 3.0].map(|rate: f64| (-rate * t).exp());
+        let c = 0.5 * one - 0.5 * two + fades * three + (x * t + y) * t + z;
+        let begins = -(0.5 - 0.5 * fades + w);
+        let d = (0.5 * t + begins) * one + 0.5 * two - 0.5 * fades * three + (x * t + v) * t + w;
+        vec![one, one - 0.5 * two, 1.0 + t, 2.0 + t + 0.5 * t * t, c, d]
+    };
+    assert!((exact(0.0)[4] - 1.0).abs() + exact(0.0)[5].abs() < 1e-14);
+    reaches(text, &[0.01, 0.7, 3.0, 12.0], exact);
+    let session = crate::common::session(text);
+    let mut simulation = session.simulate(Settings::default()).expect("starts");
+    simulation.at(12.0, &mut Default::default()).expect("runs");
+    assert_eq!(simulation.stats().steps, 0);
+    // What swings flows in by steps.
+    let swings = "initial string: A(0, 1) C(0)\nA(x, y): solve dx/dt = y, dy/dt = -x\n\
+                  A(x, y) < C(c): solve dc/dt = x - c";
+    let exact = |t: f64| vec![t.sin(), t.cos(), 0.5 * (t.sin() - t.cos() + (-t).exp())];
+    reaches(swings, &[0.5, 4.0], exact);
+}

@@ -7,6 +7,7 @@
 use dlsys_expr::{
     Array, Binary, Curve, Dual, FIELD_ARGUMENTS, FieldPart, FieldSlot, Interval, Part, Unary, Value,
 };
+use smallvec::SmallVec;
 
 /// The term Re (re + i im) τ^power exp((growth + i frequency) τ).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -209,6 +210,36 @@ impl Terms {
             return None;
         }
         Some(TermSum::new(out))
+    }
+
+    /// The sum as the first of a chain of solutions, each of which flows into the one before: `x_i' = d_i x_i + x_(i+1)`. For each, d and
+    /// the value at a time; the last one has a constant inflow, which is the second result. None if a term oscillates, or there are too many.
+    pub fn chain(&self, tau: f64) -> Option<(SmallVec<[(f64, f64); 4]>, f64)> {
+        if self.refused || self.terms().iter().any(|t| t.frequency != 0.0) {
+            return None;
+        }
+        let (mut links, mut rest) = (SmallVec::new(), *self);
+        loop {
+            let inflow = rest.as_constant();
+            if let (Some(inflow), false) = (inflow, links.is_empty()) {
+                return Some((links, inflow));
+            }
+            let varies = |t: &&Term| t.power > 0 || t.growth != 0.0;
+            let d = rest.terms().iter().find(varies).map_or(0.0, |t| t.growth);
+            links.push((d, rest.terms().iter().map(|t| t.value(tau)).sum()));
+            // The inflow: x' - d x.
+            let mut next = Terms::ZERO;
+            for t in rest.terms() {
+                next.add(Term { re: (t.growth - d) * t.re, ..*t });
+                if t.power > 0 {
+                    next.add(Term { re: f64::from(t.power) * t.re, power: t.power - 1, ..*t });
+                }
+            }
+            if links.len() == MAX_TERMS {
+                return None;
+            }
+            rest = next;
+        }
     }
 
     fn derivative(&self) -> Terms {

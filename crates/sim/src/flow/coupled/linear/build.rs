@@ -6,6 +6,7 @@ use crate::flow::coupled::system::System;
 use crate::trajectory::Trajectory;
 use dlsys_expr::Scratch;
 use dlsys_model::Rule;
+use smallvec::smallvec;
 
 /// The unknowns numbered so far.
 #[derive(Default)]
@@ -18,7 +19,8 @@ struct Unknowns {
 const NONE: u32 = u32::MAX;
 
 impl Unknowns {
-    /// Makes a source an unknown of its own if it is a closed form; None if that solves no linear equation.
+    /// Makes a source an unknown of its own if it is a closed form, and what flows into that further ones; None if that solves no linear
+    /// equations with real eigenvalues.
     fn number(&mut self, source: &VariableSource, formulas: &[FormulaInput]) -> Option<()> {
         let VariableSource::Formula(i) = *source else { return Some(()) };
         if self.inputs[i as usize] != NONE {
@@ -26,17 +28,27 @@ impl Unknowns {
         }
         let formula = &formulas[i as usize];
         let x = formula.trajectory.at(formula.x, formula.offset);
-        let (rate, decay) = match &formula.trajectory {
-            Trajectory::Polynomial([c, 0.0, 0.0, 0.0]) => (*c, 0.0),
-            Trajectory::Riccati(law) => (formula.trajectory.rate(formula.offset), law.exponential()?.1),
-            _ => return None,
+        let (mut links, inflow) = match &formula.trajectory {
+            Trajectory::Polynomial([c, 0.0, 0.0, 0.0]) => (smallvec![(0.0, x)], *c),
+            Trajectory::Riccati(law) => {
+                let decay = law.exponential()?.1;
+                // x' = rate + decay (x - x(start))
+                (smallvec![(decay, x)], formula.trajectory.rate(formula.offset) - decay * x)
+            }
+            other => other.terms(formula.x)?.chain(formula.offset)?,
         };
-        let n = self.problem.y.len() as u32;
+        links[0].1 = x;
+        let Problem { entries, b, y, .. } = &mut self.problem;
+        let n = y.len() as u32;
         self.inputs[i as usize] = n;
-        // x' = rate + decay (x - x(start))
-        self.problem.entries.push((n, n, decay));
-        self.problem.y.push(x);
-        self.problem.b.push(rate - decay * x);
+        for (n, (d, x)) in (n..).zip(&links) {
+            entries.push((n, n, *d));
+            y.push(*x);
+            b.push(0.0);
+        }
+        let last = n + links.len() as u32 - 1;
+        entries.extend((n..last).map(|n| (n, n + 1, 1.0)));
+        b[last as usize] = inflow;
         Some(())
     }
 }
