@@ -149,3 +149,29 @@ fn an_event_at_birth_says_nothing_about_the_steps_to_come() {
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-6), "{name}: {a:?} {b:?}");
     }
 }
+
+#[test]
+fn twins_are_integrated_once_and_live_as_if_they_were_alone() {
+    // Each life ends in two equals, or in one; with another beside it that is born with another value, and one that dies.
+    let text = |heirs: &str| {
+        format!(
+            "initial string: A(0.1, 1)\nA(x, y):\n if x < 1 solve dx/dt = 0.7*x*(1.3 - x)*exp(-0.2*x) + 0.05*sin(age), \
+             dy/dt = -y\n if x = 1 produce {heirs}\nB(x): if x > 0.3 solve dx/dt = -sqrt(x)\nB(x): if x = 0.3 produce C"
+        )
+    };
+    let at_end = |heirs: &str| {
+        let session = crate::common::session(&text(heirs));
+        let mut simulation = session.simulate(Settings::default()).expect("starts");
+        let mut string = Default::default();
+        simulation.at(20.0, &mut string).expect("runs");
+        let of_a = crate::common::plain(&session.model, &string);
+        (of_a.into_iter().filter(|m| m.0 == "A").collect::<Vec<_>>(), simulation.stats().rhs_evaluations)
+    };
+    let (one, work) = at_end("A(0.1, 1)");
+    let (twins, work_of_twins) = at_end("A(0.1, 1) A(0.1, 1)");
+    assert!(twins.len() == 64 && twins.iter().all(|twin| *twin == one[0]), "{} {twins:?}", one[0].1[0]);
+    // What is not evaluated again where one module goes on alone is evaluated twice where many take turns.
+    assert!(work_of_twins < 2 * work, "{work_of_twins} evaluations, {work} for one");
+    let (mixed, _) = at_end("A(0.1, 1) B(0.5) A(0.1, 1) A(0.11, 1)");
+    assert!(mixed.iter().filter(|m| **m == one[0]).count() >= twins.len(), "{}", mixed.len());
+}

@@ -163,19 +163,28 @@ fn overlooked(detector: &mut Detector, step: &ExaminedStep, rule: usize, tries: 
 }
 
 impl FlowStage<'_, '_> {
-    /// Makes a step of a module from its values in the tree; returns its length.
-    ///
-    /// # Errors
-    /// If no step can be made, or steps hardly advance time.
-    pub fn step_independent(&mut self, id: ModuleId, from: SimTime) -> Result<f64, Error> {
+    /// The experience with which a module makes its next step.
+    pub fn control_of(&self, id: ModuleId) -> Control {
         let state = self.world.state(id).expect("a module with a rule");
         let solve = state.solve.expect("has equations");
         let hint = self.flows.hints[self.world.tree.kind(id).index()][solve];
         let last = state.step.as_ref();
         let own = last.filter(|s| s.live || s.solve == solve);
-        let mut control = own.map_or(hint, |s| s.control);
         // The experience of other modules tells nothing about the error of this one's values.
-        control.error = last.map_or(0.0, |s| s.control.error);
+        Control { error: last.map_or(0.0, |s| s.control.error), ..own.map_or(hint, |s| s.control) }
+    }
+
+    /// Makes a step of a module from its values in the tree, with this experience; returns its length.
+    ///
+    /// # Errors
+    /// If no step can be made, or steps hardly advance time.
+    pub fn step_independent(
+        &mut self,
+        id: ModuleId,
+        from: SimTime,
+        mut control: Control,
+    ) -> Result<f64, Error> {
+        let solve = self.world.state(id).and_then(|state| state.solve).expect("has equations");
         let dense = self.make_own_step(id, from, &mut control).map_err(|error| {
             let own = |component: usize| {
                 let state = self.world.state(id)?;

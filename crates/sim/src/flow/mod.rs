@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! start_trajectories ─▶ closed_form            a formula, evaluated and never stepped
-//!               ─▶ independent            steps of the module alone
+//!               ─▶ independent            steps of the module alone, ─▶ twins  or of one that is alike
 //!               ─▶ coupled                one step for all modules that read one another
 //! look_ahead    ─▶ detect (zero crossings) ─▶ schedule
 //! prediction: the whole life of a module whose parameters all have closed forms, as one function
@@ -17,6 +17,7 @@ pub mod known_rates;
 pub mod lazy;
 pub mod prediction;
 mod rates;
+mod twins;
 
 use crate::detect::Detector;
 use crate::detect::crossing::needs_search;
@@ -37,6 +38,7 @@ use dlsys_tree::{ModuleId, SimTime};
 use integrator::Integrator;
 use known_rates::KnownRates;
 use smallvec::SmallVec;
+use twins::LastStep;
 
 pub use integrator::next_grid_time;
 
@@ -56,6 +58,7 @@ pub struct Flows {
     /// Steps of modules that are integrated alone, and the module and end of the last one.
     independent: Integrator,
     independent_last: Option<(ModuleId, SimTime)>,
+    last_step: Option<LastStep>,
     /// The experience of step control, by kind and number of the clause: modules of one kind under different rules take
     /// the same steps.
     hints: Vec<Vec<Control>>,
@@ -76,6 +79,7 @@ impl Flows {
             lazy_algebra: algebraic.any(|a| (0..a.of.len()).any(|place| a.is_lazy(place))),
             independent: Integrator::default(),
             independent_last: None,
+            last_step: None,
             hints: hints.collect(),
             known_rates: KnownRates::default(),
             trajectories: Vec::new(),
@@ -189,18 +193,24 @@ impl FlowStage<'_, '_> {
     pub fn look_ahead(&mut self, id: ModuleId, from: SimTime) -> Result<(), Error> {
         let model = self.setup.model;
         let who = Owner::Module(id.slot() as u32);
-        let World { tree, states, stretch, .. } = &mut *self.world;
-        let state = states[id.slot()].as_mut().expect("a module with a rule");
+        let state = self.world.state_mut(id).expect("a module with a rule");
         let rule = &model.rules[state.rule.expect("a module with a rule")];
         // The steps of coupled modules are not their own.
         let numeric = state.is_numeric() && !state.coupled;
         state.next = state.next.again();
+        let searched = !numeric && needs_search(state, rule);
+        let control = if numeric { self.control_of(id) } else { Control::default() };
+        if numeric && self.follow_twin(id, from, &control) {
+            return Ok(());
+        }
         let (h, limit) = if numeric {
-            match self.step_independent(id, from) {
+            match self.step_independent(id, from, control) {
                 Ok(h) => (h, 1.0),
                 Err(error) => return self.arrest(id, from).ok_or(error),
             }
-        } else if needs_search(state, rule) {
+        } else if searched {
+            let World { tree, states, stretch, .. } = &mut *self.world;
+            let state = states[id.slot()].as_mut().expect("a module with a rule");
             let h = if state.window > 0.0 {
                 WIDENING * state.window
             } else {
@@ -240,6 +250,9 @@ impl FlowStage<'_, '_> {
             self.schedule.schedule(who, at);
         }
         self.detector.note_approach(index.unwrap_or(0), near, before, at);
+        if numeric {
+            self.flows.last_step = Some(LastStep { id, from, control, near: before, at });
+        }
         Ok(())
     }
 
