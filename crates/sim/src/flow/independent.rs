@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::flow::FlowStage;
 use crate::flow::integrator::{StepError, StepRequest};
 use crate::trajectory::Trajectory;
-use crate::world::state::{Control, State, Step};
+use crate::world::state::{Control, Hurdle, State, Step};
 use crate::world::{World, describe};
 use dlsys_expr::{Program, Scratch};
 use dlsys_model::{Rule, Solve};
@@ -29,6 +29,15 @@ pub fn crawls(mark: &mut SimTime, since_mark: &mut usize, at: SimTime) -> bool {
     let crawls = at.since(*mark) <= CRAWL * at.to_f64();
     (*since_mark, *mark) = (0, at);
     crawls
+}
+
+/// What the steps of a module under a clause tell the next one: lives that follow each other begin alike.
+#[derive(Clone, Copy, Default)]
+pub struct Hint {
+    /// The experience of step control, with the length that the first step should have had.
+    pub control: Control,
+    /// A step that was rejected at first.
+    hurdle: Option<Hurdle>,
 }
 
 /// The equations of one module that is integrated alone.
@@ -163,28 +172,33 @@ fn overlooked(detector: &mut Detector, step: &ExaminedStep, rule: usize, tries: 
 }
 
 impl FlowStage<'_, '_> {
-    /// The experience with which a module makes its next step.
-    pub fn control_of(&self, id: ModuleId) -> Control {
+    /// The experience with which a module makes its next step; its number under the clause, and the hurdle that is known.
+    pub fn experience(&self, id: ModuleId) -> (Control, u32, Option<Hurdle>) {
         let state = self.world.state(id).expect("a module with a rule");
         let solve = state.solve.expect("has equations");
         let hint = self.flows.hints[self.world.tree.kind(id).index()][solve];
         let last = state.step.as_ref();
-        let own = last.filter(|s| s.live || s.solve == solve);
+        let (mut control, number, hurdle) = match last {
+            Some(s) if s.solve == solve => (s.control, s.number + 1, s.hurdle),
+            Some(s) if s.live => (s.control, 0, hint.hurdle),
+            _ => (hint.control, 0, hint.hurdle),
+        };
+        if let Some(hurdle) = hurdle.filter(|hurdle| hurdle.number == number) {
+            control.size = control.size.min(hurdle.size);
+        }
         // The experience of other modules tells nothing about the error of this one's values.
-        Control { error: last.map_or(0.0, |s| s.control.error), ..own.map_or(hint, |s| s.control) }
+        control.error = last.map_or(0.0, |s| s.control.error);
+        (control, number, hurdle)
     }
 
-    /// Makes a step of a module from its values in the tree, with this experience; returns its length.
+    /// Makes a step of a module from its values in the tree; returns its length.
     ///
     /// # Errors
     /// If no step can be made, or steps hardly advance time.
-    pub fn step_independent(
-        &mut self,
-        id: ModuleId,
-        from: SimTime,
-        mut control: Control,
-    ) -> Result<f64, Error> {
+    pub fn step_independent(&mut self, id: ModuleId, from: SimTime) -> Result<f64, Error> {
         let solve = self.world.state(id).and_then(|state| state.solve).expect("has equations");
+        let (mut control, number, mut hurdle) = self.experience(id);
+        let rejected = self.log.stats.rejected;
         let dense = self.make_own_step(id, from, &mut control).map_err(|error| {
             let own = |component: usize| {
                 let state = self.world.state(id)?;
@@ -193,6 +207,10 @@ impl FlowStage<'_, '_> {
             };
             self.step_error(error, from, own)
         })?;
+        let is_new = self.log.stats.rejected > rejected && hurdle.is_none_or(|hurdle| number < hurdle.number);
+        if is_new || hurdle.is_some_and(|hurdle| number == hurdle.number) {
+            hurdle = Some(Hurdle { number, size: control.size });
+        }
         let h = dense.h;
         self.flows.independent_last = Some((id, dense.end));
         let fixed = self.setup.settings.method.is_fixed_step();
@@ -206,12 +224,23 @@ impl FlowStage<'_, '_> {
                     (step.solve, step.begun, step.first) = (solve, from, control.size);
                 }
                 (step.dense, step.control, step.live) = (dense, control, true);
+                (step.number, step.hurdle) = (number, hurdle);
                 crawls(&mut step.mark, &mut step.since_mark, from)
             }
             step => {
-                let (mark, since_mark, first) = (from, 0, control.size);
-                let step_made =
-                    Step { dense, control, solve, begun: from, first, live: true, mark, since_mark };
+                let (begun, mark, since_mark, first) = (from, from, 0, control.size);
+                let step_made = Step {
+                    dense,
+                    control,
+                    solve,
+                    begun,
+                    first,
+                    number,
+                    hurdle,
+                    live: true,
+                    mark,
+                    since_mark,
+                };
                 *step = Some(Box::new(step_made));
                 false
             }
@@ -294,7 +323,8 @@ impl FlowStage<'_, '_> {
             control.foresee(control.last_error, now.since(step.dense.start), now.resolution());
             control.last_error = 1.0;
             let size = if step.dense.start == step.begun { control.size } else { step.first };
-            self.flows.hints[kind][solve] = Control { size, ..*control };
+            let control = Control { size, ..*control };
+            self.flows.hints[kind][solve] = Hint { control, hurdle: step.hurdle };
         }
     }
 

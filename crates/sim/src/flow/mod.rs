@@ -35,6 +35,7 @@ use coupled::Coupled;
 use dlsys_model::{Model, Sign};
 use dlsys_ode::Dense;
 use dlsys_tree::{ModuleId, SimTime};
+use independent::Hint;
 use integrator::Integrator;
 use known_rates::KnownRates;
 use smallvec::SmallVec;
@@ -61,7 +62,7 @@ pub struct Flows {
     last_step: Option<LastStep>,
     /// The experience of step control, by kind and number of the clause: modules of one kind under different rules take
     /// the same steps.
-    hints: Vec<Vec<Control>>,
+    hints: Vec<Vec<Hint>>,
     pub known_rates: KnownRates,
     trajectories: Vec<Trajectory>,
     y: Vec<f64>,
@@ -71,7 +72,7 @@ impl Flows {
     pub fn new(model: &Model) -> Flows {
         let hints = (model.kinds.iter()).map(|(_, kind)| {
             let clauses = kind.rules.iter().map(|r| model.rules[*r].solves.len()).max();
-            vec![Control::default(); clauses.unwrap_or(0)]
+            vec![Hint::default(); clauses.unwrap_or(0)]
         });
         let mut algebraic = model.rules.iter().flat_map(|rule| &rule.solves).map(|solve| &solve.algebraic);
         Flows {
@@ -101,7 +102,8 @@ impl Flows {
         if state.coupled && self.coupled.control.size > 0.0 {
             return self.coupled.control.size;
         }
-        let hint = state.solve.map_or(0.0, |solve| self.hints[world.tree.kind(id).index()][solve].size);
+        let hint =
+            state.solve.map_or(0.0, |solve| self.hints[world.tree.kind(id).index()][solve].control.size);
         if hint > 0.0 { hint } else { 1.0 }
     }
 
@@ -199,12 +201,12 @@ impl FlowStage<'_, '_> {
         let numeric = state.is_numeric() && !state.coupled;
         state.next = state.next.again();
         let searched = !numeric && needs_search(state, rule);
-        let control = if numeric { self.control_of(id) } else { Control::default() };
+        let control = if numeric { self.experience(id).0 } else { Control::default() };
         if numeric && self.follow_twin(id, from, &control) {
             return Ok(());
         }
         let (h, limit) = if numeric {
-            match self.step_independent(id, from, control) {
+            match self.step_independent(id, from) {
                 Ok(h) => (h, 1.0),
                 Err(error) => return self.arrest(id, from).ok_or(error),
             }

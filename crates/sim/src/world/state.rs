@@ -64,11 +64,22 @@ pub struct Step {
     pub solve: usize,
     pub begun: SimTime,
     pub first: f64,
+    /// The number of steps under this clause before this one, and one of them that was rejected at first.
+    pub number: u32,
+    pub hurdle: Option<Hurdle>,
     /// The step is of the present trajectory.
     pub live: bool,
     /// Time in the past, and the number of steps since then.
     pub mark: SimTime,
     pub since_mark: usize,
+}
+
+/// A step that was rejected at first: the number of steps that the module had made under its clause before it, and the length with
+/// which it should be tried.
+#[derive(Clone, Copy, Debug)]
+pub struct Hurdle {
+    pub number: u32,
+    pub size: f64,
 }
 
 /// The next entry of the schedule for a module.
