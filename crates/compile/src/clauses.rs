@@ -59,6 +59,26 @@ struct Smooth {
     switches: Vec<Switch>,
 }
 
+/// The parameters of a module that no clause of its rule gives an equation or a value; none if some equation does not say for what it is solved.
+fn steady(rule: &ast::Rule) -> Vec<u32> {
+    let equations = rule.clauses.iter().filter_map(|clause| match &clause.action {
+        Action::Solve(equations) => Some(equations),
+        _ => None,
+    });
+    let mut moving: Vec<&str> = Vec::new();
+    for equation in equations.flatten() {
+        match equation {
+            ast::Equation::Rate { parameter, .. } | ast::Equation::Value { parameter, .. } => {
+                moving.push(&parameter.text);
+            }
+            ast::Equation::Zero { unknown: Some(unknown), .. } => moving.push(&unknown.text),
+            ast::Equation::Zero { unknown: None, .. } => return Vec::new(),
+        }
+    }
+    let all = (0..).zip(&rule.predecessor.parameters);
+    all.filter(|(_, parameter)| !moving.contains(&&*parameter.text)).map(|(number, _)| number).collect()
+}
+
 impl RuleBuilder<'_> {
     /// Lowers a rule, which gets this index among those of the model. None if it has errors, which have been reported.
     pub fn rule(&mut self, rule: &ast::Rule, index: usize) -> Option<DeclaredRule> {
@@ -77,7 +97,7 @@ impl RuleBuilder<'_> {
         self.scope.gathered.clear();
         good &= self.locals(rule, &mut variables);
         let frame = Frame { rule, variables, own, count };
-        let mut atoms = Atoms::default();
+        let mut atoms = Atoms::of(steady(rule));
         let guards = self.guards(&frame, &mut atoms, &mut good);
         self.begin_handing(&rule.predecessor);
         let productions = self.productions(&frame, &guards, &mut atoms, &mut good);

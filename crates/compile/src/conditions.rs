@@ -1,8 +1,10 @@
 //! Decomposition of conditions into comparisons of two sides (atoms), which all clauses of a rule share.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use crate::advice;
+use crate::comparisons;
 use crate::rules::RuleBuilder;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{Binary, Node, NodeId, Unary};
@@ -30,6 +32,8 @@ pub struct Atoms {
     pub sides: Vec<(NodeId, NodeId)>,
     pub spans: Vec<Span>,
     pub boundaries: Vec<Boundary>,
+    /// The module's parameters that no clause of the rule moves.
+    steady: Vec<u32>,
     index: HashMap<(NodeId, NodeId), u32>,
 }
 
@@ -66,6 +70,10 @@ impl RuleBuilder<'_> {
                     tasks.extend([Task::Emit(step), Task::Visit(b), Task::Visit(a)]);
                 }
                 Node::Binary(op, a, b) => {
+                    if let Some(plain) = self.plain(id, span, &atoms.steady) {
+                        tasks.push(Task::Visit(plain));
+                        continue;
+                    }
                     let comparison = match op {
                         Binary::Lt => Comparison::Less,
                         Binary::Le => Comparison::LessOrEqual,
@@ -91,9 +99,32 @@ impl RuleBuilder<'_> {
         }
         Some(Condition(steps))
     }
+
+    /// A comparison in terms of what moves, if there is one; where it is written, and as what, holds for all of its parts.
+    fn plain(&mut self, id: NodeId, span: Span, steady: &[u32]) -> Option<NodeId> {
+        let plain = comparisons::plain(&mut self.scope.graph, id, &|v| steady.contains(&v))?;
+        let (at, written) = match self.scope.comparisons.get(&id) {
+            Some((at, sides)) => (*at, Some(sides.written.clone())),
+            None => (span, None),
+        };
+        for part in self.scope.graph.reachable(&[plain]) {
+            if let Node::Binary(Binary::Lt | Binary::Le | Binary::Eq, ..) = self.scope.graph.node(part)
+                && let Some(written) = &written
+            {
+                let sides = || (at, Arc::new(Sides::from(written.clone())));
+                self.scope.comparisons.entry(part).or_insert_with(sides);
+            }
+        }
+        Some(plain)
+    }
 }
 
 impl Atoms {
+    /// None yet, of a module of which these parameters do not move.
+    pub fn of(steady: Vec<u32>) -> Atoms {
+        Atoms { steady, ..Atoms::default() }
+    }
+
     /// The step that compares two sides; each pair is stored once, in either order.
     fn step(
         &mut self,

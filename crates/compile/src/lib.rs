@@ -19,6 +19,7 @@ mod chance;
 mod check;
 mod choice;
 mod clauses;
+mod comparisons;
 mod conditions;
 mod contexts;
 mod curves;

@@ -257,13 +257,11 @@ impl Frozen {
     /// positive.
     fn level(&mut self, graph: &mut Graph, x: NodeId, rebuilt: NodeId, closed: bool) -> (NodeId, NodeId) {
         let [zero, half, one, two] = [0.0, 0.5, 1.0, 2.0].map(|x| graph.constant(x));
-        let pi = graph.constant(std::f64::consts::PI);
-        let phase = graph.binary(Binary::Mul, pi, x);
-        let sine = graph.unary(Unary::Sin, phase);
+        let sine = graph.unary(Unary::SinPi, x);
         let change = graph.binary(Binary::Lt, zero, sine);
         let mut is_even = change;
         if closed {
-            let cosine = graph.unary(Unary::Cos, phase);
+            let cosine = graph.unary(Unary::CosPi, x);
             let (on, up) = (graph.binary(Binary::Eq, zero, sine), graph.binary(Binary::Lt, zero, cosine));
             let on_even = graph.binary(Binary::And, on, up);
             is_even = graph.binary(Binary::Or, change, on_even);

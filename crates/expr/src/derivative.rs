@@ -99,6 +99,12 @@ impl Graph {
                 let sine = self.unary(Unary::Sin, x);
                 self.unary(Unary::Neg, sine)
             }
+            Unary::SinPi | Unary::CosPi => {
+                let (other, sign) =
+                    if op == Unary::SinPi { (Unary::CosPi, 1.0) } else { (Unary::SinPi, -1.0) };
+                let (other, pi) = (self.unary(other, x), self.constant(sign * std::f64::consts::PI));
+                self.binary(Binary::Mul, pi, other)
+            }
             Unary::Tan => {
                 let square = self.binary(Binary::Mul, value, value);
                 self.binary(Binary::Add, one, square)
@@ -222,7 +228,7 @@ mod tests {
             let mut nodes = vec![g.var(0), g.var(1), g.constant(0.7), g.constant(2.0)];
             for (op, a, b) in choices {
                 let (a, b) = (nodes[a % nodes.len()], nodes[b % nodes.len()]);
-                let unary = [Unary::Neg, Unary::Sqrt, Unary::Exp, Unary::Ln, Unary::Log10, Unary::Expm1, Unary::Ln1p, Unary::Abs, Unary::Sin,
+                let unary = [Unary::Neg, Unary::Sqrt, Unary::Exp, Unary::Ln, Unary::Log10, Unary::Expm1, Unary::Ln1p, Unary::Abs, Unary::Sin, Unary::SinPi, Unary::CosPi,
                     Unary::Cos, Unary::Tan, Unary::Asin, Unary::Acos, Unary::Atan, Unary::Sinh, Unary::Cosh, Unary::Tanh];
                 let binary = [Binary::Add, Binary::Sub, Binary::Mul, Binary::Div, Binary::Pow, Binary::Min, Binary::Max, Binary::Atan2];
                 let node = match op {

@@ -1,6 +1,7 @@
 //! Values with their derivative along a trajectory (forward differentiation).
 
 use super::{Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Interval, Part, Unary, Value};
+use std::f64::consts::PI;
 
 /// A value and its rate of change.
 #[derive(Clone, Copy, Debug)]
@@ -83,6 +84,8 @@ impl<T: Differentiable> Value for Dual<T> {
             }
             Unary::Sin => T::unary(Unary::Cos, x),
             Unary::Cos => T::unary(Unary::Neg, T::unary(Unary::Sin, x)),
+            Unary::SinPi => T::binary(Binary::Mul, T::constant(PI), T::unary(Unary::CosPi, x)),
+            Unary::CosPi => T::binary(Binary::Mul, T::constant(-PI), T::unary(Unary::SinPi, x)),
             Unary::Tan => T::binary(Binary::Add, one, square(value)),
             Unary::Asin | Unary::Acos => {
                 let root = T::unary(Unary::Sqrt, T::binary(Binary::Sub, one, square(x)));

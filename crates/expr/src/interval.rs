@@ -5,6 +5,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use super::ops::in_period;
 use super::{Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Part, Unary, Value};
 
 /// The numbers from `lo` to `hi`, or nothing where the expression is undefined on the whole set.
@@ -176,6 +177,12 @@ impl Value for Interval {
             }
             Unary::Cos => a.cos(),
             Unary::Sin => Interval { lo: a.lo - FRAC_PI_2, hi: a.hi - FRAC_PI_2, ..a }.cos(),
+            // Within one period the product with π keeps the digits.
+            Unary::SinPi | Unary::CosPi => {
+                let shift = if a.lo.is_finite() { a.lo - in_period(a.lo) } else { 0.0 };
+                let phase = Interval { lo: PI * (a.lo - shift), hi: PI * (a.hi - shift), ..a };
+                Interval::unary(if op == Unary::SinPi { Unary::Sin } else { Unary::Cos }, phase)
+            }
             Unary::Tan => {
                 let branch = |x: f64| ((x + FRAC_PI_2) / PI).floor();
                 if branch(a.lo) == branch(a.hi) { a.increasing(f64::tan) } else { Interval::ENTIRE }

@@ -37,6 +37,10 @@ pub enum Unary {
     Sin,
     /// Cosine of an angle in radians.
     Cos,
+    /// Sine of π times a: exactly 0 at whole numbers.
+    SinPi,
+    /// Cosine of π times a: exactly 0 half way between whole numbers.
+    CosPi,
     /// Tangent of an angle in radians.
     Tan,
     /// Arcus sine in radians, from -π/2 to π/2; NaN beyond ±1.
@@ -137,6 +141,17 @@ pub trait Value: Copy {
     fn field(field: &FieldSlot, part: FieldPart, at: [Self; FIELD_ARGUMENTS]) -> Self;
 }
 
+/// A number less the nearest even one, exactly.
+pub(crate) fn in_period(a: f64) -> f64 {
+    a - 2.0 * (0.5 * a).round()
+}
+
+/// The sine of π r, for r from -1 to 1.
+fn sin_of_half_turns(r: f64) -> f64 {
+    let quarter = if r.abs() > 0.5 { 1.0 - r.abs() } else { r.abs() };
+    (std::f64::consts::PI * quarter).sin().copysign(r)
+}
+
 fn truth(b: bool) -> f64 {
     f64::from(u8::from(b))
 }
@@ -173,6 +188,8 @@ impl Value for f64 {
             Unary::Ceil => a.ceil(),
             Unary::Sin => a.sin(),
             Unary::Cos => a.cos(),
+            Unary::SinPi => sin_of_half_turns(in_period(a)),
+            Unary::CosPi => sin_of_half_turns(0.5 - in_period(a).abs()),
             Unary::Tan => a.tan(),
             Unary::Asin => a.asin(),
             Unary::Acos => a.acos(),

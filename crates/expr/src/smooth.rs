@@ -147,6 +147,8 @@ impl Value for Smooth {
             Unary::Log10 => a.ln().scaled(std::f64::consts::LOG10_E),
             Unary::Sin => a.wave(a.middle.sin()),
             Unary::Cos => a.wave(a.middle.cos()),
+            Unary::SinPi => Smooth::unary(Unary::Sin, a.scaled(std::f64::consts::PI)),
+            Unary::CosPi => Smooth::unary(Unary::Cos, a.scaled(std::f64::consts::PI)),
             Unary::Tan => a.wave(a.middle.sin()).times(a.wave(a.middle.cos()).reciprocal()),
             Unary::Sinh => a.exp().plus(a.scaled(-1.0).exp().scaled(-1.0)).scaled(0.5),
             Unary::Cosh => a.exp().plus(a.scaled(-1.0).exp()).scaled(0.5),

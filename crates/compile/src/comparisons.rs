@@ -1,0 +1,197 @@
+//! Comparisons of values that jump or rest, as comparisons of what moves.
+//!
+//! `floor(x) = 2` changes where x passes 2 and 3, but the difference of its sides rests at whole numbers and jumps from one to the
+//! next: whether it has just jumped cannot be told from its value near the jump, where x may be rounded to either side. `2 <= x & x < 3`
+//! says the same, and changes where differences of smooth values cross zero. The same holds for `sign`, and for comparisons of
+//! `max(x, y)`, `min(x, y)` and `abs(x)` with an operand, which rest at equality.
+
+use dlsys_expr::{Binary, Graph, Node, NodeId, Unary};
+
+/// A comparison that holds for the same values and compares what moves; None if there is none. Comparisons with NaN keep their results.
+/// `is_steady` tells variables that do not move.
+pub fn plain(graph: &mut Graph, id: NodeId, is_steady: &dyn Fn(u32) -> bool) -> Option<NodeId> {
+    let Node::Binary(op, a, b) = graph.node(id) else { return None };
+    match op {
+        Binary::Eq => equal(graph, a, b, is_steady).or_else(|| equal(graph, b, a, is_steady)),
+        Binary::Ne => {
+            let equal = equal(graph, a, b, is_steady).or_else(|| equal(graph, b, a, is_steady))?;
+            Some(graph.unary(Unary::Not, equal))
+        }
+        Binary::Lt | Binary::Le => {
+            let is_strict = op == Binary::Lt;
+            below(graph, a, b, is_strict, is_steady).or_else(|| above(graph, a, b, is_strict, is_steady))
+        }
+        _ => None,
+    }
+}
+
+/// True if an expression does not move, so that its whole parts do not jump.
+fn rests(graph: &Graph, id: NodeId, is_steady: &dyn Fn(u32) -> bool) -> bool {
+    graph.variables(&[id]).into_iter().all(is_steady)
+}
+
+/// `x < y`, or `x <= y`.
+fn ordered(graph: &mut Graph, is_strict: bool, x: NodeId, y: NodeId) -> NodeId {
+    graph.binary(if is_strict { Binary::Lt } else { Binary::Le }, x, y)
+}
+
+/// `floor(x) + n`, or `ceil(x) + n`.
+fn whole(graph: &mut Graph, op: Unary, x: NodeId, n: f64) -> NodeId {
+    let (part, n) = (graph.unary(op, x), graph.constant(n));
+    graph.binary(Binary::Add, part, n)
+}
+
+/// `step = level`.
+fn equal(graph: &mut Graph, step: NodeId, level: NodeId, is_steady: &dyn Fn(u32) -> bool) -> Option<NodeId> {
+    let zero = graph.constant(0.0);
+    match graph.node(step) {
+        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if rests(graph, level, is_steady) => {
+            let part = graph.unary(op, level);
+            let is_whole = graph.binary(Binary::Eq, level, part);
+            // From level to level + 1, or from level - 1 to level.
+            let beside = graph.constant(if op == Unary::Floor { 1.0 } else { -1.0 });
+            let beside = graph.binary(Binary::Add, level, beside);
+            let (lo, hi) = if op == Unary::Floor { (level, beside) } else { (beside, level) };
+            let from = ordered(graph, op == Unary::Ceil, lo, x);
+            let to = ordered(graph, op == Unary::Floor, x, hi);
+            let both = graph.binary(Binary::And, from, to);
+            match graph.as_constant(is_whole) {
+                Some(1.0) => Some(both),
+                Some(_) => Some(zero),
+                None => Some(graph.binary(Binary::And, is_whole, both)),
+            }
+        }
+        Node::Unary(Unary::Sign, x) => match graph.as_constant(level)? {
+            1.0 => Some(ordered(graph, true, zero, x)),
+            -1.0 => Some(ordered(graph, true, x, zero)),
+            0.0 => Some(graph.binary(Binary::Eq, x, zero)),
+            _ => Some(zero),
+        },
+        Node::Unary(Unary::Abs, x) if x == level => Some(ordered(graph, false, zero, x)),
+        Node::Binary(op @ (Binary::Min | Binary::Max), x, y) if x == level || y == level => {
+            let (same, other) = if x == level { (x, y) } else { (y, x) };
+            let (lo, hi) = if op == Binary::Min { (same, other) } else { (other, same) };
+            Some(ordered(graph, false, lo, hi))
+        }
+        _ => None,
+    }
+}
+
+/// `step < level`, or `step <= level`.
+fn below(
+    graph: &mut Graph,
+    step: NodeId,
+    level: NodeId,
+    is_strict: bool,
+    is_steady: &dyn Fn(u32) -> bool,
+) -> Option<NodeId> {
+    match graph.node(step) {
+        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if rests(graph, level, is_steady) => {
+            // floor(x) < l: x < ceil(l). floor(x) <= l: x < floor(l) + 1. ceil(x) < l: x <= ceil(l) - 1. ceil(x) <= l: x <= floor(l).
+            let is_floor = op == Unary::Floor;
+            let part = if is_strict { Unary::Ceil } else { Unary::Floor };
+            let shift = f64::from(u8::from(is_floor)) - f64::from(u8::from(is_strict));
+            let end = whole(graph, part, level, shift);
+            Some(ordered(graph, is_floor, x, end))
+        }
+        Node::Unary(Unary::Sign, x) => {
+            let (level, zero) = (graph.as_constant(level)?, graph.constant(0.0));
+            let holds = |sign: f64| if is_strict { sign < level } else { sign <= level };
+            match [-1.0, 0.0, 1.0].map(holds) {
+                [true, false, false] => Some(ordered(graph, true, x, zero)),
+                [true, true, false] => Some(ordered(graph, false, x, zero)),
+                _ => None,
+            }
+        }
+        // max(x, y) <= y, and min(x, y) < y.
+        Node::Binary(op @ (Binary::Min | Binary::Max), x, y)
+            if (x == level || y == level) && is_strict == (op == Binary::Min) =>
+        {
+            let other = if x == level { y } else { x };
+            Some(ordered(graph, is_strict, other, level))
+        }
+        _ => None,
+    }
+}
+
+/// `level < step`, or `level <= step`.
+fn above(
+    graph: &mut Graph,
+    level: NodeId,
+    step: NodeId,
+    is_strict: bool,
+    is_steady: &dyn Fn(u32) -> bool,
+) -> Option<NodeId> {
+    match graph.node(step) {
+        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if rests(graph, level, is_steady) => {
+            // l < floor(x): floor(l) + 1 <= x. l <= floor(x): ceil(l) <= x. l < ceil(x): floor(l) < x. l <= ceil(x): ceil(l) - 1 < x.
+            let is_floor = op == Unary::Floor;
+            let part = if is_strict { Unary::Floor } else { Unary::Ceil };
+            let shift = f64::from(u8::from(is_strict)) - f64::from(u8::from(!is_floor));
+            let end = whole(graph, part, level, shift);
+            Some(ordered(graph, !is_floor, end, x))
+        }
+        Node::Unary(Unary::Sign, x) => {
+            let (level, zero) = (graph.as_constant(level)?, graph.constant(0.0));
+            let holds = |sign: f64| if is_strict { level < sign } else { level <= sign };
+            match [-1.0, 0.0, 1.0].map(holds) {
+                [false, false, true] => Some(ordered(graph, true, zero, x)),
+                [false, true, true] => Some(ordered(graph, false, zero, x)),
+                _ => None,
+            }
+        }
+        // y < max(x, y), and y <= min(x, y).
+        Node::Binary(op @ (Binary::Min | Binary::Max), x, y)
+            if (x == level || y == level) && is_strict == (op == Binary::Max) =>
+        {
+            let other = if x == level { y } else { x };
+            Some(ordered(graph, is_strict, level, other))
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::plain;
+    use dlsys_expr::{Binary, Graph, NodeId, Program, Unary};
+
+    /// The value of an expression of x and y.
+    fn value(graph: &Graph, root: NodeId, variables: [f64; 2]) -> f64 {
+        Program::compile(graph, &[root], 2).eval_one(&variables)
+    }
+
+    #[test]
+    fn plain_comparisons_hold_for_the_same_values() {
+        let numbers = [-2.5, -2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0, 2.5, f64::NAN];
+        let mut graph = Graph::default();
+        let (x, y) = (graph.var(0), graph.var(1));
+        let mut steps: Vec<NodeId> =
+            [Unary::Floor, Unary::Ceil, Unary::Sign, Unary::Abs].map(|op| graph.unary(op, x)).into();
+        for op in [Binary::Min, Binary::Max] {
+            steps.extend([graph.binary(op, x, y), graph.binary(op, y, x)]);
+        }
+        let mut levels: Vec<NodeId> = numbers[..11].iter().map(|number| graph.constant(*number)).collect();
+        levels.extend([x, y]);
+        let mut known = 0;
+        for step in steps {
+            for &level in &levels {
+                for op in [Binary::Lt, Binary::Le, Binary::Eq, Binary::Ne] {
+                    for (a, b) in [(step, level), (level, step)] {
+                        let written = graph.binary(op, a, b);
+                        // y rests, x moves.
+                        let Some(made) = plain(&mut graph, written, &|v| v == 1) else { continue };
+                        known += 1;
+                        for &x in &numbers {
+                            for &y in &numbers {
+                                let [before, after] = [written, made].map(|root| value(&graph, root, [x, y]));
+                                assert_eq!(before, after, "{op:?} {step:?} {level:?}: {x}, {y}");
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        assert!(known > 250, "{known}");
+    }
+}
