@@ -156,7 +156,7 @@ fn twins_are_integrated_once_and_live_as_if_they_were_alone() {
     let text = |heirs: &str| {
         format!(
             "initial string: A(0.1, 1)\nA(x, y):\n if x < 1 solve dx/dt = 0.7*x*(1.3 - x)*exp(-0.2*x) + 0.05*sin(age), \
-             dy/dt = -y\n if x = 1 produce {heirs}\nB(x): if x > 0.3 solve dx/dt = -sqrt(x)\nB(x): if x = 0.3 produce C"
+             dy/dt = -y\n if x = 1 produce {heirs}\nB(x):\n if x > 0.3 solve dx/dt = -sqrt(x)\n if x = 0.3 produce C"
         )
     };
     let at_end = |heirs: &str| {

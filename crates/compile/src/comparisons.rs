@@ -7,10 +7,15 @@
 
 use dlsys_expr::{Binary, Graph, Node, NodeId, Unary};
 
+/// Whole numbers below this are added without rounding.
+const EXACT: f64 = (1u64 << 50) as f64;
+
 /// A comparison that holds for the same values and compares what moves; None if there is none. Comparisons with NaN keep their results.
 /// `is_steady` tells variables that do not move.
 pub fn plain(graph: &mut Graph, id: NodeId, is_steady: &dyn Fn(u32) -> bool) -> Option<NodeId> {
     let Node::Binary(op, a, b) = graph.node(id) else { return None };
+    let (a, b) = shifted(graph, a, b);
+    let (b, a) = shifted(graph, b, a);
     match op {
         Binary::Eq => equal(graph, a, b, is_steady).or_else(|| equal(graph, b, a, is_steady)),
         Binary::Ne => {
@@ -25,9 +30,30 @@ pub fn plain(graph: &mut Graph, id: NodeId, is_steady: &dyn Fn(u32) -> bool) -> 
     }
 }
 
-/// True if an expression does not move, so that its whole parts do not jump.
-fn rests(graph: &Graph, id: NodeId, is_steady: &dyn Fn(u32) -> bool) -> bool {
-    graph.variables(&[id]).into_iter().all(is_steady)
+/// `step + n` and a level, both whole numbers, as the step and the level less n.
+fn shifted(graph: &mut Graph, sum: NodeId, level: NodeId) -> (NodeId, NodeId) {
+    let is_whole = |x: &f64| *x == x.floor() && x.abs() < EXACT;
+    let whole = |graph: &Graph, id| graph.as_constant(id).filter(is_whole);
+    if let Node::Binary(op @ (Binary::Add | Binary::Sub), a, b) = graph.node(sum)
+        && let Some(level_is) = whole(graph, level)
+    {
+        let (step, n) = match (whole(graph, a), whole(graph, b)) {
+            (None, Some(n)) if op == Binary::Add => (a, n),
+            (None, Some(n)) => (a, -n),
+            (Some(n), None) if op == Binary::Add => (b, n),
+            _ => return (sum, level),
+        };
+        if matches!(graph.node(step), Node::Unary(Unary::Floor | Unary::Ceil | Unary::Sign, _)) {
+            return (step, graph.constant(level_is - n));
+        }
+    }
+    (sum, level)
+}
+
+/// True if an expression moves, so that its whole part jumps, and a level does not, so that its whole part does not.
+fn jumps(graph: &Graph, x: NodeId, level: NodeId, is_steady: &dyn Fn(u32) -> bool) -> bool {
+    let rests = |id| graph.variables(&[id]).into_iter().all(is_steady);
+    rests(level) && !rests(x)
 }
 
 /// `x < y`, or `x <= y`.
@@ -45,7 +71,7 @@ fn whole(graph: &mut Graph, op: Unary, x: NodeId, n: f64) -> NodeId {
 fn equal(graph: &mut Graph, step: NodeId, level: NodeId, is_steady: &dyn Fn(u32) -> bool) -> Option<NodeId> {
     let zero = graph.constant(0.0);
     match graph.node(step) {
-        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if rests(graph, level, is_steady) => {
+        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if jumps(graph, x, level, is_steady) => {
             let part = graph.unary(op, level);
             let is_whole = graph.binary(Binary::Eq, level, part);
             // From level to level + 1, or from level - 1 to level.
@@ -86,7 +112,7 @@ fn below(
     is_steady: &dyn Fn(u32) -> bool,
 ) -> Option<NodeId> {
     match graph.node(step) {
-        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if rests(graph, level, is_steady) => {
+        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if jumps(graph, x, level, is_steady) => {
             // floor(x) < l: x < ceil(l). floor(x) <= l: x < floor(l) + 1. ceil(x) < l: x <= ceil(l) - 1. ceil(x) <= l: x <= floor(l).
             let is_floor = op == Unary::Floor;
             let part = if is_strict { Unary::Ceil } else { Unary::Floor };
@@ -123,7 +149,7 @@ fn above(
     is_steady: &dyn Fn(u32) -> bool,
 ) -> Option<NodeId> {
     match graph.node(step) {
-        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if rests(graph, level, is_steady) => {
+        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if jumps(graph, x, level, is_steady) => {
             // l < floor(x): floor(l) + 1 <= x. l <= floor(x): ceil(l) <= x. l < ceil(x): floor(l) < x. l <= ceil(x): ceil(l) - 1 < x.
             let is_floor = op == Unary::Floor;
             let part = if is_strict { Unary::Floor } else { Unary::Ceil };
@@ -170,6 +196,13 @@ mod tests {
             [Unary::Floor, Unary::Ceil, Unary::Sign, Unary::Abs].map(|op| graph.unary(op, x)).into();
         for op in [Binary::Min, Binary::Max] {
             steps.extend([graph.binary(op, x, y), graph.binary(op, y, x)]);
+        }
+        for (op, n) in [(Binary::Add, 1.0), (Binary::Sub, 2.0)] {
+            let n = graph.constant(n);
+            for step in 0..3 {
+                steps.push(graph.binary(op, steps[step], n));
+            }
+            steps.push(graph.binary(Binary::Add, n, steps[0]));
         }
         let mut levels: Vec<NodeId> = numbers[..11].iter().map(|number| graph.constant(*number)).collect();
         levels.extend([x, y]);

@@ -102,8 +102,13 @@ pub enum ZeroCrossing {
         /// The level, a function of the variables that do not change.
         level: Program,
     },
-    /// The zero is searched for along the trajectory (formulas or dense output). Contains the difference if it is affine.
-    Search(Option<AffineSum>),
+    /// The zero is searched for along the trajectory (formulas or dense output).
+    Search {
+        /// The difference, if it is affine.
+        sum: Option<AffineSum>,
+        /// The one variable that moves, and the level at which the difference is zero, a function of the others.
+        level: Option<(usize, Program)>,
+    },
 }
 
 /// `constant + Σ factor · variable`.

@@ -18,7 +18,7 @@ pub fn crossing(
     }
     let difference = graph.binary(Binary::Sub, a, b);
     let Some(p) = graph.polynomial(difference, |v| !constants.is_constant(v)) else {
-        return ZeroCrossing::Search(None);
+        return ZeroCrossing::Search { sum: None, level: None };
     };
     let moving: Vec<(&[(u32, u32)], NodeId)> =
         p.terms.iter().filter(|(m, _)| !m.is_empty()).map(|(m, c)| (&m[..], *c)).collect();
@@ -26,9 +26,6 @@ pub fn crossing(
         [] => ZeroCrossing::Constant,
         [(&[(variable, 1)], slope)] => {
             let v = variable as usize;
-            if v >= constants.own && v < constants.time || v < constants.own && !monotone(v) {
-                return ZeroCrossing::Search(sum(graph, &p));
-            }
             let level = match p.terms.get(&Monomial::new()) {
                 None => graph.constant(0.0),
                 Some(&rest) => {
@@ -36,9 +33,13 @@ pub fn crossing(
                     graph.binary(Binary::Div, minus, slope)
                 }
             };
-            ZeroCrossing::Formula { variable: v, level: Program::compile(graph, &[level], total) }
+            let level = Program::compile(graph, &[level], total);
+            if v >= constants.own && v < constants.time || v < constants.own && !monotone(v) {
+                return ZeroCrossing::Search { sum: sum(graph, &p), level: Some((v, level)) };
+            }
+            ZeroCrossing::Formula { variable: v, level }
         }
-        _ => ZeroCrossing::Search(sum(graph, &p)),
+        _ => ZeroCrossing::Search { sum: sum(graph, &p), level: None },
     }
 }
 

@@ -69,6 +69,6 @@ pub fn is_simple(rule: &Rule, solve: Option<usize>) -> bool {
         let mut laws = clause.solution_forms.iter();
         clause.switches.is_empty() && laws.all(|law| matches!(law, Polynomial(_) | Quadratic(_)))
     };
-    let is_searched = |watch: &ZeroCrossing| matches!(watch, ZeroCrossing::Search(_));
+    let is_searched = |watch: &ZeroCrossing| matches!(watch, ZeroCrossing::Search { .. });
     clause.is_none_or(has_formulas) && !rule.zero_crossings(solve).iter().any(is_searched)
 }

@@ -71,7 +71,7 @@ pub struct Difference<'w, 'p> {
 impl Function for Difference<'_, '_> {
     fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
         // The difference of values that move together may vary much less than each of them does.
-        if let ZeroCrossing::Search(Some(sum)) =
+        if let ZeroCrossing::Search { sum: Some(sum), .. } =
             &self.path.rule.zero_crossings(self.path.state.solve)[self.atom]
             && let Some(bounds) = self.path.sum_over(sum, lo, hi)
         {
@@ -170,7 +170,7 @@ pub(super) fn location_method<'w>(crossing: &'w ZeroCrossing, state: &State) -> 
             Some(trajectory) if !trajectory.is_formula() => LocationMethod::Search,
             _ => LocationMethod::Formula(*variable, level),
         },
-        ZeroCrossing::Search(_) => LocationMethod::Search,
+        ZeroCrossing::Search { .. } => LocationMethod::Search,
     }
 }
 
@@ -187,7 +187,7 @@ pub(super) fn level_of_dense(
     }
     match crossing {
         ZeroCrossing::Formula { variable, level } => Some((*variable, value(level)?, 0.0)),
-        ZeroCrossing::Search(Some(AffineSum { constant, terms })) if terms.len() == 1 => {
+        ZeroCrossing::Search { sum: Some(AffineSum { constant, terms }), .. } if terms.len() == 1 => {
             let (variable, factor) = terms[0];
             Some((variable, -constant / factor, sign_of(sign) * factor))
         }
@@ -269,12 +269,13 @@ impl CrossingDetector {
         };
         let Root { position, at, after } = root?;
         let time = path.start.after(position * path.h);
-        let passes = at == Sign::Zero && after == opposite(sign);
+        // At the end of a path what comes after may not be known.
+        let passes = at == Sign::Zero && after != sign;
         let level = if passes { self.level_of(path, atom) } else { None };
         Some(Crossing { position, time, at, after, level })
     }
 
-    /// The parameter of the module whose value the condition of a production compares with a level that rests, and the level.
+    /// The parameter of the module, or of a neighbour, whose value the condition of a production compares with a level that rests, and the level.
     /// Without it a successor that gets a value at its limit would get a rounding of the limit, perhaps on its other side.
     fn level_of(&mut self, path: &Path, atom: usize) -> Option<(usize, f64)> {
         let decides = |condition: &Condition| condition.atoms().any(|(other, _)| other == atom);
@@ -283,13 +284,12 @@ impl CrossingDetector {
         }
         let (variable, level) = match &path.rule.zero_crossings(path.state.solve)[atom] {
             ZeroCrossing::Formula { variable, level } => (*variable, self.level(path, level)),
-            ZeroCrossing::Search(Some(sum)) => match sum.terms[..] {
-                [(variable, factor)] if factor.abs() == 1.0 => (variable, 0.0 - factor * sum.constant),
-                _ => return None,
-            },
+            ZeroCrossing::Search { level: Some((variable, level)), .. } => {
+                (*variable, self.level(path, level) + 0.0)
+            }
             _ => return None,
         };
-        (variable < path.state.trajectories.len()).then_some((variable, level))
+        (variable < path.rule.time_variable()).then_some((variable, level))
     }
 
     /// The effect of the rounding of the variables on the difference of two sides; 0 where the difference jumps.

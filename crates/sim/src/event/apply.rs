@@ -174,6 +174,11 @@ impl EventStage<'_, '_> {
                 true => self.world.variables(rule, fire.id, around, now, variables),
                 false => self.world.variables_read((rule, &[]), fire.id, around, now, variables),
             }
+            let state = self.world.state(fire.id).filter(|state| state.rule == Some(fire.rule));
+            for &(variable, level) in state.iter().flat_map(|state| &state.open).flat_map(|open| &open.levels)
+            {
+                variables[variable] = level;
+            }
             let lineage = self.world.tree.lineage(fire.id);
             let residual = if self.log.records() { self.residual(fire) } else { 0.0 };
             let made = match clause.is_fault {

@@ -72,9 +72,13 @@ impl EventStage<'_, '_> {
         }
         self.world.rebase(id, now);
         // Where the instant is known from a level, the value there is that level, not a rounding of it.
-        for (parameter, level) in touched.iter().filter_map(|change| change.level) {
-            let place = self.world.tree.places(id).start + parameter;
-            self.world.tree.set_value(place, level);
+        for (variable, level) in touched.iter().filter_map(|change| change.level) {
+            let places = self.world.tree.places(id);
+            if variable < places.len() {
+                self.world.tree.set_value(places.start + variable, level);
+            } else if let Some(open) = self.world.state_mut(id).and_then(|state| state.open.as_mut()) {
+                open.levels.push((variable, level));
+            }
         }
     }
 

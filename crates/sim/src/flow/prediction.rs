@@ -147,7 +147,7 @@ pub fn first_crossing(
     let mut first: Option<Change> = None;
     let mut lasting = Some(None);
     for (atom, watch) in watches.iter().enumerate() {
-        if matches!(watch, ZeroCrossing::Search(_)) {
+        if matches!(watch, ZeroCrossing::Search { .. }) {
             return None;
         }
         let Some(PredictedCrossing { time, tau, level }) = meet(atom) else { continue };

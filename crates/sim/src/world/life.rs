@@ -253,7 +253,7 @@ fn is_timeless(rule: &Rule) -> bool {
     let watch_is_blind = |watch: &ZeroCrossing| match watch {
         ZeroCrossing::Constant => true,
         ZeroCrossing::Formula { variable, level } => *variable != time && blind(level),
-        ZeroCrossing::Search(_) => false,
+        ZeroCrossing::Search { .. } => false,
     };
     let solve_is_blind = |s: &Solve| {
         blind(&s.rates)

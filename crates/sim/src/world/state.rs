@@ -181,7 +181,7 @@ pub struct Change {
     pub time: SimTime,
     pub at: Sign,
     pub after: Sign,
-    /// The parameter that meets a level there, and the level.
+    /// The variable that meets a level there, one of the module's parameters or of its neighbours', and the level.
     pub level: Option<(usize, f64)>,
 }
 
@@ -201,6 +201,8 @@ pub struct Open {
     pub flips: usize,
     /// No side is near the other: signs are what they are.
     pub clear: bool,
+    /// Values of neighbours that meet a level at the instant, by variable: what follows from that gets the level, not a rounding of it.
+    pub levels: SmallVec<[(usize, f64); 1]>,
 }
 
 impl State {
