@@ -334,6 +334,41 @@ impl Program {
         wanted.into_iter().map(|register| register as usize).filter(|r| *r < self.variables).collect()
     }
 
+    /// The variables that decide over something that jumps: a whole part or a sign, a comparison, the element of an array or the piece
+    /// of a curve; ascending.
+    pub fn jump_reads(&self) -> Vec<usize> {
+        let mut all: BTreeSet<Register> = BTreeSet::new();
+        for (place, instruction) in self.code.iter().enumerate() {
+            let mut wanted: BTreeSet<Register> = self.jumps_over(instruction).into_iter().flatten().collect();
+            for before in self.code[..place].iter().rev() {
+                if wanted.is_empty() {
+                    break;
+                }
+                if wanted.remove(&before.destination()) {
+                    wanted.extend(before.operands().into_iter().flatten());
+                }
+            }
+            all.extend(wanted);
+        }
+        all.into_iter().map(|register| register as usize).filter(|r| *r < self.variables).collect()
+    }
+
+    /// The operands over which an instruction jumps.
+    fn jumps_over(&self, instruction: &Instruction) -> [Option<Register>; 2] {
+        let compares = |op| matches!(op, Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne);
+        match *instruction {
+            Instruction::Unary(Unary::Floor | Unary::Ceil | Unary::Sign, _, a) => [Some(a), None],
+            Instruction::Binary(op, _, a, b) if compares(op) => [Some(a), Some(b)],
+            Instruction::Left(op, .., a) | Instruction::Right(op, _, a, _) if compares(op) => [Some(a), None],
+            Instruction::Select(_, c, ..) => [Some(c), None],
+            Instruction::Element(.., a) | Instruction::Piece(.., a, _) => [Some(a), None],
+            Instruction::Curve(curve, part, _, a) if self.curves[curve as usize].jumps(part) => {
+                [Some(a), None]
+            }
+            _ => [None; 2],
+        }
+    }
+
     /// Evaluates all roots, in the order in which they were compiled.
     ///
     /// `variables` gives the variables from 0 on; `out` takes as many values as there are roots.

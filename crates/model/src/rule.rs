@@ -239,6 +239,12 @@ impl Outcome {
         key.wrapping_add(successor as u64)
     }
 
+    /// The variables that decide over something that jumps in its weights, arguments and draws; a variable may occur several times.
+    pub fn jump_reads(&self) -> impl Iterator<Item = usize> + '_ {
+        let strings = self.successors.iter().flat_map(Successor::programs);
+        strings.chain(&self.weights).flat_map(Program::jump_reads)
+    }
+
     /// The variables that its weights, arguments and draws read; a variable may occur several times.
     pub fn reads(&self) -> impl Iterator<Item = usize> + '_ {
         let strings = self.successors.iter().flat_map(Successor::programs);

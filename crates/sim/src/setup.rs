@@ -1,7 +1,7 @@
 //! The facts of a run that do not change: the model, the settings, and their consequences.
 
 use super::{Method, Settings};
-use dlsys_model::{CUT, KindId, Model};
+use dlsys_model::{CUT, KindId, Model, Rule, ZeroCrossing};
 use dlsys_tree::Seed;
 
 /// The facts of a run. Every stage reads them, none writes them.
@@ -24,6 +24,8 @@ pub struct Setup<'m> {
     pub kinds_with_context: Vec<bool>,
     /// By rule: some successor of it reads parameters of the context.
     pub successors_read_context: Vec<bool>,
+    /// By rule: a variable that meets a level decides over something that jumps in a successor.
+    pub levels_decide: Vec<bool>,
     /// Neighbours are remembered.
     pub hands_on: bool,
     /// Some rule has an aggregate.
@@ -67,6 +69,7 @@ impl<'m> Setup<'m> {
             looks_around,
             kinds_with_context,
             successors_read_context: successors_read_context.collect(),
+            levels_decide: model.rules.iter().map(levels_decide).collect(),
             hands_on,
             gathers,
             plain: !hands_on && !gathers && !is_algebraic && !is_discrete && !settings.transitions,
@@ -81,4 +84,19 @@ impl<'m> Setup<'m> {
     pub fn skips(&self, kind: KindId) -> bool {
         self.model.kinds.get(kind).skipped
     }
+}
+
+/// True if a variable that meets a level, at which conditions of a rule change, decides over something that jumps in one of its successors.
+pub fn levels_decide(rule: &Rule) -> bool {
+    let crossings =
+        rule.solves.iter().map(|solve| &solve.zero_crossings).chain([&rule.zero_crossings_at_rest]);
+    let meets: Vec<usize> = (crossings.flatten())
+        .filter_map(|crossing| match crossing {
+            ZeroCrossing::Formula { variable, .. }
+            | ZeroCrossing::Search { level: Some((variable, _)), .. } => Some(*variable),
+            _ => None,
+        })
+        .collect();
+    !meets.is_empty()
+        && rule.produces.iter().any(|produce| produce.outcome.jump_reads().any(|v| meets.contains(&v)))
 }

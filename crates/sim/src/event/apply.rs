@@ -15,6 +15,7 @@ use crate::world::World;
 use crate::world::context::Context;
 use crate::world::life::{End, LifeClass};
 use crate::world::new_modules::kinds_of;
+use crate::world::state::Level;
 use dlsys_model::{Comparison, KindId, Model, Rule, Sign};
 use dlsys_tree::{Lineage, ModuleId};
 
@@ -61,6 +62,37 @@ pub fn residual(rule: &Rule, produce: usize, zero: impl Fn(usize) -> bool, scrat
         .filter(|(atom, comparison)| *comparison == Comparison::Equal || zero(*atom))
         .map(|(atom, _)| (sides[2 * atom] - sides[2 * atom + 1]).abs())
         .fold(0.0, f64::max)
+}
+
+/// Most steps of rounding by which a level is moved, so that the sides that meet there are equal.
+const MOST_ULPS: u32 = 8;
+
+/// Gives the variables that meet a level their levels, not roundings of them. Where they `decide` over something that jumps in a successor,
+/// the sides that meet there are equal to the last bit, if they can be: `3.4*x` is 2 where it reaches 2, and not a little less.
+fn set_levels(world: &World, fire: &Firing, (rule, decide): (&Rule, bool), scratch: &mut Scratch) {
+    let Some(state) = world.state(fire.id).filter(|state| state.rule == Some(fire.rule)) else { return };
+    let Scratch { variables, registers, .. } = scratch;
+    for &Level { atom, variable, value, after } in state.open.iter().flat_map(|open| &open.levels) {
+        variables[variable] = value;
+        if !decide {
+            continue;
+        }
+        let mut sides = vec![0.0; rule.sides.outputs()];
+        let mut sign_with = |candidate: f64| {
+            variables[variable] = candidate;
+            rule.sides.eval(variables, registers, &mut sides);
+            Sign::of(sides[2 * atom] - sides[2 * atom + 1])
+        };
+        let (mut up, mut down, mut all) = (value, value, vec![value]);
+        for _ in 0..MOST_ULPS {
+            (up, down) = (up.next_up(), down.next_down());
+            all.extend([up, down]);
+        }
+        // Where rounding makes them unequal everywhere, they are on the side that comes.
+        let mut with = |sign: Sign| all.iter().copied().find(|candidate| sign_with(*candidate) == sign);
+        let equal = with(Sign::Zero).or_else(|| with(after));
+        variables[variable] = equal.unwrap_or(value);
+    }
 }
 
 impl EventStage<'_, '_> {
@@ -174,11 +206,7 @@ impl EventStage<'_, '_> {
                 true => self.world.variables(rule, fire.id, around, now, variables),
                 false => self.world.variables_read((rule, &[]), fire.id, around, now, variables),
             }
-            let state = self.world.state(fire.id).filter(|state| state.rule == Some(fire.rule));
-            for &(variable, level) in state.iter().flat_map(|state| &state.open).flat_map(|open| &open.levels)
-            {
-                variables[variable] = level;
-            }
+            set_levels(self.world, fire, (rule, self.setup.levels_decide[fire.rule]), self.scratch);
             let lineage = self.world.tree.lineage(fire.id);
             let residual = if self.log.records() { self.residual(fire) } else { 0.0 };
             let made = match clause.is_fault {

@@ -9,7 +9,7 @@ use crate::schedule::{NextEvent, Owner};
 use crate::trajectory::Trajectory;
 use crate::world::brief;
 use crate::world::context::Context;
-use crate::world::state::{Change, NextKind, Open, State};
+use crate::world::state::{Change, Level, NextKind, Open, State};
 use dlsys_model::{Sign, Truth, ZeroCrossing};
 use dlsys_tree::ModuleId;
 
@@ -72,12 +72,15 @@ impl EventStage<'_, '_> {
         }
         self.world.rebase(id, now);
         // Where the instant is known from a level, the value there is that level, not a rounding of it.
-        for (variable, level) in touched.iter().filter_map(|change| change.level) {
+        for change in touched {
+            let Some((variable, value)) = change.level else { continue };
             let places = self.world.tree.places(id);
             if variable < places.len() {
-                self.world.tree.set_value(places.start + variable, level);
-            } else if let Some(open) = self.world.state_mut(id).and_then(|state| state.open.as_mut()) {
-                open.levels.push((variable, level));
+                self.world.tree.set_value(places.start + variable, value);
+            }
+            if let Some(open) = self.world.state_mut(id).and_then(|state| state.open.as_mut()) {
+                let (atom, after) = (change.atom, change.after);
+                open.levels.push(Level { atom, variable, value, after });
             }
         }
     }
@@ -142,7 +145,11 @@ impl EventStage<'_, '_> {
     pub fn begin_predicted(&mut self, id: ModuleId, index: usize) -> bool {
         let rule = &self.setup.model.rules[index];
         // Algebraic parameters must be made consistent first.
-        if self.setup.numeric_only || !self.setup.fast_path || rule.is_algebraic() {
+        if self.setup.numeric_only
+            || !self.setup.fast_path
+            || rule.is_algebraic()
+            || self.setup.levels_decide[index]
+        {
             return false;
         }
         if self.world.lives.rule(self.world.tree.kind(id)).is_some() {
@@ -182,6 +189,9 @@ impl EventStage<'_, '_> {
             return None;
         }
         let (id, rule) = (state.id, state.rule?);
+        if self.setup.levels_decide[rule] {
+            return None;
+        }
         if self.setup.kinds_with_context[self.world.tree.kind(id).index()] || !state.next.changes().is_empty()
         {
             return None;

@@ -8,6 +8,7 @@
 
 use smallvec::SmallVec;
 
+use crate::setup::levels_decide;
 use crate::trajectory::Trajectory;
 use crate::world::new_modules::NewModules;
 use crate::world::state::Signs;
@@ -173,7 +174,8 @@ impl Lives {
                 // The surroundings change what they give at any time.
                 let alone = alone && kind.read_inputs().next().is_none();
                 // Algebraic parameters must be made consistent first.
-                kind.rules.first().copied().filter(|rule| alone && !model.rules[*rule].is_algebraic())
+                let is_plain = |rule: &Rule| !rule.is_algebraic() && !levels_decide(rule);
+                kind.rules.first().copied().filter(|rule| alone && is_plain(&model.rules[*rule]))
             })
             .collect();
         let of_rule = vec![Vec::new(); model.rules.len()];

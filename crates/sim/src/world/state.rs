@@ -201,8 +201,18 @@ pub struct Open {
     pub flips: usize,
     /// No side is near the other: signs are what they are.
     pub clear: bool,
-    /// Values of neighbours that meet a level at the instant, by variable: what follows from that gets the level, not a rounding of it.
-    pub levels: SmallVec<[(usize, f64); 1]>,
+    /// The variables that meet a level at the instant: what follows from that gets the level, not a rounding of it.
+    pub levels: SmallVec<[Level; 1]>,
+}
+
+/// A variable at the level at which the sides of an atom meet.
+#[derive(Clone, Copy, Debug)]
+pub struct Level {
+    pub atom: usize,
+    pub variable: usize,
+    pub value: f64,
+    /// The sign of the difference of the sides just after.
+    pub after: Sign,
 }
 
 impl State {

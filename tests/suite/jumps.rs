@@ -1,0 +1,178 @@
+//! What jumps, in rates, values, conditions and successors: `floor`, `ceil`, `sign`, elements of arrays, comparisons that rest at equality.
+//! Each against the solution by hand.
+
+use crate::common::{Plain, fails, run};
+use dlsys::sim::{Error, Method, Settings};
+
+fn at(text: &str, t: f64) -> Vec<Plain> {
+    run(text, Settings::default(), &[t]).unwrap_or_else(|e| panic!("{e}\n{text}")).remove(0)
+}
+
+/// The parameters of the modules of a kind, by `auto` and by two methods that integrate everything.
+fn reaches(text: &str, t: f64, name: &str, expected: &[f64]) {
+    for method in [Method::Auto, Method::Dop853, Method::Radau] {
+        let settings = Settings { method, ..Settings::default() };
+        let string =
+            run(text, settings, &[t]).unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}")).remove(0);
+        let found: Vec<f64> =
+            string.iter().filter(|m| m.0 == name).flat_map(|m| m.1.iter().copied()).collect();
+        assert_eq!(found.len(), expected.len(), "{method:?}: {string:?}");
+        let is_near = |(x, y): (&f64, &f64)| (x - y).abs() <= 2e-5 * y.abs().max(1.0);
+        assert!(found.iter().zip(expected).all(is_near), "{method:?}: {found:?}, not {expected:?}\n{text}");
+    }
+}
+
+#[test]
+fn whole_numbers_of_neighbours_and_counts_are_whole() {
+    let rate = "const rate = [0, 1, 2, 3]\n";
+    reaches(
+        &format!("{rate}initial string: N(2) B(0)\nN(n) < B(x): solve dx/dt = rate[n]"),
+        1.0,
+        "B",
+        &[2.0],
+    );
+    reaches(
+        &format!("{rate}initial string: B(0) [ L ] [ L ]\nB(x): solve dx/dt = rate[count(L)]"),
+        1.0,
+        "B",
+        &[2.0],
+    );
+    for (law, expected) in [
+        ("floor(n)", 3.0),
+        ("ceil(n)", 3.0),
+        ("floor(n/3)", 1.0),
+        ("n - 2*floor(n/2)", 1.0),
+        ("rate[n] + floor(n + 0.5)", 6.0),
+    ] {
+        let text = format!("{rate}initial string: N(3) B(0)\nN(n) < B(x): solve dx/dt = {law}");
+        reaches(&text, 1.0, "B", &[expected]);
+    }
+    reaches("initial string: B(0) [ A ] [ A ] [ A ]\nB(x): solve x = floor(count(A)/3)", 1.0, "B", &[1.0]);
+}
+
+#[test]
+fn no_jump_of_a_whole_part_is_passed_over() {
+    // y falls from 1.17 like an exponential, and floor(1.8 y) = 1 from t = ln(1.872/1.813111) to ln(1.872/1.257556).
+    let y = "dy/dt = (-0.702 - y)*(1 + 0*sin(y))";
+    let [from, to] = [2.0, 1.0].map(|level| (1.872f64 / (level / 1.8 + 0.702)).ln());
+    let x = -0.21 * 3.0 + 1.77 * (to - from);
+    let text = format!(
+        "initial string: A(0, 1.17)\nA(x, y): solve dx/dt = if floor(1.8*y) = 1 then 1.56 else -0.21, {y}"
+    );
+    reaches(&text, 3.0, "A", &[x, 1.872 * (-3f64).exp() - 0.702]);
+    // A difference of a value and its whole part.
+    let text = "initial string: A(0, 1.32)\nA(z, y): solve z = if 0.5*y - floor(0.5*y) < 0.3 then 1.18 else 0.66, dy/dt = 1.771*cos(t)";
+    reaches(text, 3.0, "A", &[0.66, 1.32 + 1.771 * 3f64.sin()]);
+    // Several whole parts, in a value that is matched.
+    let text = "initial string: A(0, 0.73)\nA(x, y): solve dx/dt = match ceil(3.46*y) - 1 case -1: 3 case 0: 1.49 case 1: 1.9 else 0.07, dy/dt = -1.938";
+    let passes = |level: f64| (0.73 - level / 3.46) / 1.938;
+    let x = 0.07 * passes(2.0)
+        + 1.9 * (passes(1.0) - passes(2.0))
+        + 1.49 * (passes(0.0) - passes(1.0))
+        + 3.0 * (passes(-1.0) - passes(0.0))
+        + 0.07 * (3.0 - passes(-1.0));
+    reaches(text, 3.0, "A", &[x, 0.73 - 3.0 * 1.938]);
+}
+
+/// x'' = -1 above a level and 1 below it, from a distance d at rest: parabolas, each of which lasts sqrt(2 d) to the level.
+fn swing(d: f64, t: f64) -> f64 {
+    let quarter = (2.0 * d).sqrt();
+    let phase = t % (4.0 * quarter);
+    let half = |s: f64| d - 0.5 * (s - quarter) * (s - quarter);
+    match phase {
+        s if s <= quarter => d - 0.5 * s * s,
+        s if s <= 3.0 * quarter => -half(s - quarter),
+        s => half(s - 3.0 * quarter),
+    }
+}
+
+#[test]
+fn oscillations_through_a_jump_keep_their_size() {
+    for condition in [
+        "floor(x) < 2",
+        "ceil(x) <= 2",
+        "max(x, 2) <= 2",
+        "min(x, 2) < 2",
+        "sign(x - 2) < 1",
+        "1 >= floor(x)",
+    ] {
+        for start in [2.52, 2.9] {
+            let text = format!(
+                "initial string: C({start}, 0)\nC(x, v): solve dx/dt = v, dv/dt = if {condition} then 1 + 0*x*sin(v) else -1 + 0*x*sin(v)"
+            );
+            let x = at(&text, 7.3)[0].1[0];
+            let exact = 2.0 + swing(start - 2.0, 7.3);
+            assert!((x - exact).abs() < 1e-4, "{condition}: {x}, not {exact}");
+        }
+    }
+    let text = "initial string: C(-0.027, 0)\nC(x, v): solve dx/dt = v, dv/dt = match sign(2*x - 1) case 1: -1 case -1: 1 else 0";
+    let x = at(text, 3.0)[0].1[0];
+    assert!((x - (0.5 - swing(0.527, 3.0))).abs() < 1e-4, "{x}");
+}
+
+#[test]
+fn equations_that_push_against_each_other_at_a_jump_are_an_error() {
+    for start in [0.6, 0.3] {
+        let text =
+            format!("initial string: C({start})\nC(x): solve dx/dt = if floor(2.5*x) < 1 then 1 else -1");
+        let error = fails(&text, 0.5);
+        assert!(matches!(error, Error::Chattering { .. }), "{error}");
+    }
+    let error =
+        fails("initial string: C(0.472)\nC(x): solve dx/dt = if floor(2.135*x) < 1 then 1 else -1", 1.0);
+    assert!(matches!(error, Error::Chattering { .. }), "{error}");
+}
+
+#[test]
+fn equalities_that_begin_to_hold_for_good_are_seen() {
+    for condition in ["max(x, 0) = x", "abs(x) = x", "x = max(0, x)", "min(x, 0) != x"] {
+        let text = format!("initial string: C(-0.5)\nC(x): solve dx/dt = if {condition} then 2 else 1");
+        reaches(&text, 1.5, "C", &[2.0]);
+    }
+    let text = "initial string: C(-0.5)\nC(x):\n solve dx/dt = 1\n if abs(x) = x & x > 0 produce E(t)";
+    assert!((at(text, 1.0)[0].1[0] - 0.5).abs() < 1e-9);
+}
+
+#[test]
+fn a_jump_in_a_branch_that_is_not_taken_disturbs_nothing() {
+    let text = "initial string: B(0.227, -0.988)\nB(x, y): solve dx/dt = 1.325*(2.067 - x), dy/dt = 1.497*((if y > 9 then (match floor(1.765*y) case 0: -0.5 case 1: 0.5 else 1) else x) - y)";
+    let y = at(text, 3.0)[0].1[1];
+    assert!((y - 1.91153).abs() < 1e-4, "{y}");
+}
+
+#[test]
+fn a_production_happens_once_for_one_jump() {
+    for x in ["dx/dt = 1", "dx/dt = 1 + 0*sin(x)"] {
+        for condition in ["floor(x) != n", "floor(x) > n", "x >= n + 1", "x < n | x >= n + 1"] {
+            let text = format!(
+                "initial string: X(0) A(0, 0)\nX(x): solve {x}\nX(x) < A(n, k): if {condition} produce A(floor(x), k + 1)"
+            );
+            let string = at(&text, 10.5);
+            let counter = string.iter().find(|m| m.0 == "A").expect("it is there");
+            assert_eq!(counter.1, [10.0, 10.0], "{x}, {condition}");
+        }
+    }
+    let string = at("initial string: A(0, 0)\nA(n, k): if floor(t) != n produce A(floor(t), k + 1)", 10.5);
+    assert_eq!(string[0].1, [10.0, 10.0]);
+}
+
+#[test]
+fn successors_get_the_level_at_which_their_condition_holds() {
+    let q = "const q = [0, 1, 2, 3]\n";
+    let of = |text: &str| at(text, 3.0).iter().find(|m| m.0 == "E").map(|m| m.1.clone());
+    for law in ["1.17 + 0*sin(x)", "1.17"] {
+        let text = format!(
+            "{q}initial string: X(0.57) A\nX(x): solve dx/dt = {law}\nX(x) < A: if x = 1 produce E(q[x], x)"
+        );
+        assert_eq!(of(&text), Some(vec![1.0, 1.0]), "{law}");
+        for factor in ["0.87", "1.83", "3.39", "2"] {
+            for head in ["X(x) < A", "X(x)"] {
+                let text = format!(
+                    "initial string: X(0.1) A\nX(x): solve dx/dt = {law}\n{head}: if {factor}*x >= 2 produce E(floor({factor}*x))"
+                );
+                let text = if head == "X(x)" { text.replacen("\nX(x): if", "\n  if", 1) } else { text };
+                assert_eq!(of(&text), Some(vec![2.0]), "{text}");
+            }
+        }
+    }
+}
