@@ -62,7 +62,9 @@ pub fn comments(text: &str) -> Option<(Vec<Diagnostic>, String)> {
     let (mut start, mut is_behind_line) = (0, false);
     while start < text.len() {
         let line = text[start..].split_inclusive('\n').next().unwrap_or_default();
-        let code = line.split('#').next().unwrap_or_default();
+        let is_outside = |at: &usize| line[..*at].matches('"').count() % 2 == 0;
+        let first = |sign| line.match_indices(sign).map(|(at, _)| at).find(is_outside);
+        let code = &line[..first("#").unwrap_or(line.len())];
         let body = code.trim_start();
         if body.strip_prefix("//").is_some_and(|rest| rest.trim_start().starts_with(char::is_alphabetic)) {
             // Lines in a row are one comment.
@@ -75,8 +77,7 @@ pub fn comments(text: &str) -> Option<(Vec<Diagnostic>, String)> {
             continue;
         }
         is_behind_line = false;
-        let opening = code.find("/*").filter(|at| code[..*at].matches('"').count() % 2 == 0);
-        let Some(at) = opening.map(|at| start + at) else {
+        let Some(at) = first("/*").filter(|at| *at < code.len()).map(|at| start + at) else {
             rest.push_str(line);
             start += line.len();
             continue;
@@ -223,7 +224,7 @@ mod tests {
             ("angle 20\n  // Figure 1\n// é\nF", "angle 20\n             \n     \nF"),
             ("F /* a\nb */ G", "F     \n     G"),
             ("F # /* no\nG /* X", "F # /* no\nG     "),
-            ("t \"a/*b\" /**/", "t \"a/*b\"     "),
+            ("t \"#a/*b\" /**/", "t \"#a/*b\"     "),
         ] {
             let (found, rest) = comments(text).expect("a comment");
             assert_eq!((found.len(), &rest[..]), (1, kept), "{text}");
