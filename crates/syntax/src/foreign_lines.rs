@@ -62,7 +62,7 @@ pub fn comments(text: &str) -> Option<(Vec<Diagnostic>, String)> {
     let (mut start, mut is_behind_line) = (0, false);
     while start < text.len() {
         let line = text[start..].split_inclusive('\n').next().unwrap_or_default();
-        let is_outside = |at: &usize| line[..*at].matches('"').count() % 2 == 0;
+        let is_outside = |at: &usize| line[..*at].matches('"').count().is_multiple_of(2);
         let first = |sign| line.match_indices(sign).map(|(at, _)| at).find(is_outside);
         let code = &line[..first("#").unwrap_or(line.len())];
         let body = code.trim_start();
