@@ -314,6 +314,7 @@ fn options(order: &Order<'_>, run: &ModelRun, survey: &Survey, fit: &Fit) -> Opt
     let extent = fit.accuracy / Fit::ACCURACY;
     let mut options = Options::new(&run.session.model, fit.default_width, extent);
     options.threads = order.threads;
+    options.grown = fit.is_grown();
     options.gases = true;
     if let Some(accuracy) = order.accuracy {
         options.accuracy = fit.clone().with_accuracy(accuracy).accuracy / extent;

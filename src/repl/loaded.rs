@@ -266,7 +266,8 @@ pub fn misused(name: &str) -> CommandError {
 /// The error for a line that is neither a command nor text of a model.
 fn unknown(text: &str) -> CommandError {
     let line = text.lines().next().unwrap_or("").trim();
-    if let Some(said) = foreign_lines::comment(line).or_else(|| foreign_syntax::line(line, 0)) {
+    let comment = foreign_lines::comments(line).and_then(|(errors, _)| errors.into_iter().next());
+    if let Some(said) = comment.or_else(|| foreign_syntax::line(line, 0)) {
         return CommandError::new(format!("{}\n  {}", said.message, said.help.join("\n  ")));
     }
     let (word, _) = first_word(line);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fs;
 
 use dlsys::interchange::{Error, Format, Growth, Limits, Options, grow};
-use dlsys::render::{self, Fit, FrameWriter, Survey, View};
+use dlsys::render::{self, Fit, FrameWriter, Neck, Survey, View};
 use dlsys::scene::{Point, Scene, Segment, Vector};
 use dlsys::session::{Nursery, Session};
 use dlsys::sim::{Settings, Simulation};
@@ -42,6 +42,7 @@ pub fn follow(session: Session, [from, to, step]: [f64; 3], threads: usize) -> F
     let fit = FrameWriter::new(render::Format::OBJ, survey.fit()).fit;
     let mut options = Options::new(&session.model, fit.default_width, fit.accuracy / Fit::ACCURACY);
     options.threads = threads;
+    options.grown = fit.is_grown();
     let growth = grow(&session, settings, &times, &options, &mut |_| true).expect("a growth");
     Followed { session, growth, options }
 }
@@ -50,14 +51,25 @@ pub fn model(name: &str) -> Session {
     Session::open(&repository(&format!("models/{name}")), &[]).expect("a model")
 }
 
-/// Points on the side of a stem.
-fn side(segment: &Segment, default_width: f64) -> Vec<Point> {
+/// Points on the side of a stem, which narrows where an axis goes on into it at its end.
+fn side(segment: &Segment, neck: Option<Neck>, default_width: f64) -> Vec<Point> {
     let radii = segment.widths.map(|w| w.resolve(default_width) / 2.0);
+    let length = (segment.end - segment.start).norm();
+    let radius = |part: f64| {
+        let plain = |part: f64| radii[0] + (radii[1] - radii[0]) * part;
+        match neck.filter(|neck| part * length < neck.length) {
+            Some(neck) => {
+                let (u, narrow) = (part * length / neck.length, plain(neck.length / length));
+                neck.radius + (narrow - neck.radius) * u * u * (3.0 - 2.0 * u)
+            }
+            None => plain(part),
+        }
+    };
     let u = segment.across;
     let v = segment.direction.cross(&u);
     let at = |(part, angle): (f64, f64)| {
         let out: Vector = u * angle.cos() + v * angle.sin();
-        segment.start + (segment.end - segment.start) * part + out * (radii[0] + (radii[1] - radii[0]) * part)
+        segment.start + (segment.end - segment.start) * part + out * radius(part)
     };
     let angles = (0..6).map(|k| f64::from(k) * 1.1);
     angles.flat_map(|angle| [0.0, 0.3, 0.7, 1.0].map(|part| (part, angle))).map(at).collect()
@@ -90,8 +102,14 @@ pub fn worst_of(
             let kind = dlsys::render::plain_name(&owner.name);
             points.entry(format!("{kind}.{}", owner.lineage.name())).or_default().extend(some);
         };
-        for segment in scene.segments.iter().filter(|segment| segment.contour.is_none()) {
-            add(segment.owner, side(segment, options.default_width));
+        let necks = match options.grown {
+            true => render::necks(&scene, options.default_width),
+            false => vec![None; scene.segments.len()],
+        };
+        for (segment, neck) in
+            scene.segments.iter().zip(necks).filter(|(segment, _)| segment.contour.is_none())
+        {
+            add(segment.owner, side(segment, neck, options.default_width));
         }
         for polygon in &scene.polygons {
             add(polygon.owner, polygon.vertices.clone());
@@ -208,6 +226,34 @@ fn what_is_let_go_flies_as_its_drawing_does() {
     let worst = worst(&followed, &random_times(0.0, 1.5, 100), 0.0);
     let allowed = followed.options.accuracy * followed.options.extent;
     assert!(worst <= allowed, "{worst} of {allowed}");
+}
+
+/// A fork whose shoots grow from nothing, in width and in length, is one node a module: no shape takes the place of another. Its shoots begin as wide as their stem in the
+/// end, and the file follows them on the way.
+#[test]
+fn a_fork_that_grows_is_one_node_a_module() {
+    let text = "initial string: T [ +(35) A(0, 0) ] [ -(35) &(20) A(0, 0) ]
+def c(x) = if x < 1 then x else 1
+A(w, l): solve w = c(age/4), l = c(age/6)
+interpret T: @W(1) F(3)
+interpret A(w, l): @W(0.7*w) F(3*l)";
+    let session = Session::from_text("fork.dls", text, &[]).expect("a model");
+    let followed = follow(session, [0.0, 8.0, 0.5], 2);
+    assert_eq!(followed.growth.nodes(), 3);
+    let off = worst(&followed, &random_times(0.0, 8.0, 30), 0.0);
+    let allowed = followed.options.accuracy * followed.options.extent;
+    assert!(off < allowed, "{off} of {allowed}");
+    let glb = Glb::read(&followed.growth.file(Format::Glb).expect("a file"));
+    let wide = |seconds: f64| {
+        let shown = glb.shown(seconds);
+        let beside = Point::new(0.0, 3.0, 0.0) + Vector::new(0.0, 0.3, 0.4);
+        shown
+            .iter()
+            .filter(|(name, _)| name.starts_with('A'))
+            .map(|(_, shape)| shape.distance(beside))
+            .fold(f64::INFINITY, f64::min)
+    };
+    assert!(wide(8.0) < 0.1 && wide(1.0) > 0.3, "{} {}", wide(8.0), wide(1.0));
 }
 
 #[test]

@@ -15,7 +15,8 @@
 //! * *smoothing*: the PNG against the reduced one. Two ways to smooth edges cannot agree better than that.
 //!
 //! A picture is beyond the bounds if at its size it differs by more than the bound and its share of the smoothing. `(edges)` tells that it
-//! is within the bounds when drawn large.
+//! is within the bounds when drawn large, `(detail)` that it is so but for its share of the smoothing: drawn large it is about as near to the finer picture as
+//! the PNG of its size, which is made of the same cells.
 //!
 //! The view `clear` is that from the front without a background: opacities are compared instead of colours, and the bounds hold when
 //! drawn large.
@@ -192,10 +193,11 @@ impl Found {
             view.name(),
             self.bytes.div_ceil(1000),
             parts.join("   "),
-            match (self.is_beyond(view), self.large.is_beyond(&Difference::default())) {
-                (false, _) => "",
-                (true, false) => "  BEYOND (edges)",
-                (true, true) => "  BEYOND",
+            match [Difference::default(), self.floor].map(|floor| self.large.is_beyond(&floor)) {
+                _ if !self.is_beyond(view) => "",
+                [false, _] => "  BEYOND (edges)",
+                [true, false] => "  BEYOND (detail)",
+                [true, true] => "  BEYOND",
             }
         )
     }

@@ -13,7 +13,8 @@
 //! The accuracy bounds the distance of every point of the file from that of the model, at frames and between them. Its parts: triangles in place of curved
 //! surfaces 0.36 (an estimate); of frames, what happens between samples 0.18, tracks 0.13; of shapes, differences of modules that share a life, samples included, 0.25, what is between
 //! two ages 0.08 (of sheets and ground, which are triangles, 0.4).
-//! Stems end in half balls, also where they meet, in place of the joints of OBJ meshes.
+//! Stems end in half balls, also where they meet, in place of the joints of OBJ meshes; only where an axis goes on into shoots at its end these begin as wide as
+//! that and narrow behind it.
 //!
 //! ```
 //! use dlsys_interchange::{Format, Options, grow};
@@ -117,6 +118,8 @@ impl Default for Limits {
 pub struct Options {
     /// Width of a line without a width of its own, in units of the model.
     pub default_width: f64,
+    /// Whether stems go on into shoots at their ends smoothly: they do in drawings with depth, not in diagrams. See [`Fit::is_grown`](dlsys_render::Fit::is_grown).
+    pub grown: bool,
     /// Largest extent of the whole animation, in units of the model.
     pub extent: f64,
     /// Largest distance of a point of the file from that of the model, in parts of the extent.
@@ -146,6 +149,7 @@ impl Options {
         let units = model.scenery.units;
         Options {
             default_width,
+            grown: true,
             extent,
             accuracy: Options::ACCURACY,
             seconds: units.time,
@@ -217,7 +221,8 @@ pub fn grow(
     let longest = if sways(model) { SWAY / model.scenery.units.time } else { f64::INFINITY };
     let longest = longest.min(((last - first) / INTERVALS).max(f64::MIN_POSITIVE));
     let instant = INSTANT / options.seconds;
-    let sampler = Sampler { default_width: options.default_width, metres: options.metres };
+    let Options { default_width, metres, grown, .. } = *options;
+    let sampler = Sampler { default_width, metres, grown };
     let mut follower = Follower {
         nursery: &nursery,
         sampler,

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 
 use crate::blend::{Example, blend};
 use crate::part::{Form, Paint, Part, distance, triple};
+use crate::stem::SIZES;
 use crate::thin::{place, thin};
 use crate::track::Phase;
 
@@ -35,9 +36,26 @@ pub(crate) enum Shape {
     /// The first shape, and of each other one as much as its weight says, from 0 to 1, instead. Weights by age, one for each other shape.
     /// `examples` are for the normals of corners, which are no sums; without them each shape has its own.
     Mixed { shapes: Vec<Vec<f32>>, weights: Vec<f32>, examples: Vec<Example> },
-    /// A straight stem of this contour: a unit stem of length, lower and upper radius 1, enlarged by `size`. Weights by age: how much shorter, thinner
-    /// below and thinner above.
-    Stem { contour: Option<u32>, size: f32, weights: Vec<f32> },
+    /// A straight stem of this contour, with a neck or none: one whose [sizes](crate::stem::SIZES) are 1, enlarged by `size`. Weights by age: how much smaller each of these
+    /// is.
+    Stem { contour: Option<u32>, neck: bool, size: f32, weights: Vec<f32> },
+}
+
+impl Shape {
+    /// How many weights it has at an age.
+    pub(crate) fn targets(&self) -> usize {
+        match self {
+            Shape::Still(_) => 0,
+            Shape::Mixed { shapes, .. } => shapes.len() - 1,
+            Shape::Stem { neck, .. } => {
+                if *neck {
+                    SIZES
+                } else {
+                    3
+                }
+            }
+        }
+    }
 }
 
 /// Lives, and the number of the life of each phase.
@@ -139,7 +157,8 @@ pub(crate) fn lives(phases: &[Phase], tolerance: Tolerance, slack: f64) -> Lives
 
 fn life(model: usize, phase: &Phase, ages: &[f64], tolerance: f64) -> Life {
     let (ages, shape) = match &phase.form[..] {
-        [Part::Stem(contour)] => stem(phase, ages, *contour, tolerance),
+        [Part::Stem(contour)] => stem(phase, ages, (*contour, false), tolerance),
+        [Part::Shoot(contour)] => stem(phase, ages, (*contour, true), tolerance),
         _ => still(phase, ages, tolerance)
             .or_else(|| line(phase, ages, tolerance))
             .unwrap_or_else(|| mixed(phase, ages, tolerance)),
@@ -221,13 +240,19 @@ fn hats(phase: &Phase, ages: &[f64], tolerance: f64) -> (Vec<f64>, Shape) {
     (kept.iter().map(|&i| ages[i]).collect(), Shape::Mixed { shapes, weights, examples: Vec::new() })
 }
 
-/// A straight stem: its length and its radii are enough.
-fn stem(phase: &Phase, ages: &[f64], contour: Option<u32>, tolerance: f64) -> (Vec<f64>, Shape) {
-    let sizes: Vec<[f64; 3]> = (0..ages.len())
+/// A straight stem: its lengths and its radii are enough.
+fn stem(
+    phase: &Phase,
+    ages: &[f64],
+    (contour, neck): (Option<u32>, bool),
+    tolerance: f64,
+) -> (Vec<f64>, Shape) {
+    let sizes: Vec<[f64; SIZES]> = (0..ages.len())
         .map(|i| {
             let numbers = phase.numbers(i);
             let radii = triple(numbers, 4);
-            [(triple(numbers, 1) - triple(numbers, 0)).norm(), radii.x, radii.y]
+            let length = |end| (triple(numbers, end) - triple(numbers, 0)).norm();
+            [length(1), radii.x, radii.y, if neck { length(5) } else { 0.0 }, radii.z]
         })
         .collect();
     let size = sizes.iter().flatten().fold(0.0_f64, |a, b| a.max(*b));
@@ -235,22 +260,26 @@ fn stem(phase: &Phase, ages: &[f64], contour: Option<u32>, tolerance: f64) -> (V
         (i + 1..j).all(|k| {
             let w = (ages[k] - ages[i]) / (ages[j] - ages[i]);
             let off = |n: usize| (sizes[i][n] + (sizes[j][n] - sizes[i][n]) * w - sizes[k][n]).abs();
-            off(0) + off(1).max(off(2)) <= tolerance
+            is_near(off, tolerance)
         })
     });
     let kept = match still_sizes(&sizes, tolerance) {
         true => vec![ages.len() / 2],
         false => kept,
     };
-    let weights = kept.iter().flat_map(|&i| sizes[i].map(|own| (1.0 - own / size).clamp(0.0, 1.0) as f32));
-    let shape = Shape::Stem { contour, size: size as f32, weights: weights.collect() };
+    let count = if neck { SIZES } else { 3 };
+    let own = kept.iter().flat_map(|&i| &sizes[i][..count]);
+    let weights = own.map(|own| (1.0 - own / size).clamp(0.0, 1.0) as f32);
+    let shape = Shape::Stem { contour, neck, size: size as f32, weights: weights.collect() };
     (kept.iter().map(|&i| ages[i]).collect(), shape)
 }
 
-fn still_sizes(sizes: &[[f64; 3]], tolerance: f64) -> bool {
+fn still_sizes(sizes: &[[f64; SIZES]], tolerance: f64) -> bool {
     let middle = sizes[sizes.len() / 2];
-    sizes.iter().all(|own| {
-        let off = |n: usize| (own[n] - middle[n]).abs();
-        off(0) + off(1).max(off(2)) <= tolerance
-    })
+    sizes.iter().all(|own| is_near(|n: usize| (own[n] - middle[n]).abs(), tolerance))
+}
+
+/// Whether corners move by this much at most where sizes differ by these.
+fn is_near(off: impl Fn(usize) -> f64, tolerance: f64) -> bool {
+    off(0).max(off(3)) + off(1).max(off(2)).max(off(4)) <= tolerance
 }

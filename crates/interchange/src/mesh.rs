@@ -60,9 +60,10 @@ impl Cutter<'_> {
             let own: Vec<&[N]> = shapes.iter().map(|shape| &shape[first..first + part.numbers()]).collect();
             let material = material.unwrap_or(MaterialId::LEAF);
             match *part {
-                Part::Stem(contour) => {
-                    let tube =
-                        self.tube(contour, own.iter().map(|n| triple(n, 2).norm()).fold(0.0, f64::max));
+                Part::Stem(contour) | Part::Shoot(contour) => {
+                    let neck = matches!(part, Part::Shoot(_));
+                    let tube = self
+                        .tube((contour, neck), own.iter().map(|n| triple(n, 2).norm()).fold(0.0, f64::max));
                     let (triangles, corners) = (tube.triangles.clone(), tube.corners.len());
                     layout.add(&mut counts, material, &triangles, corners, first, PieceShape::Stem(tube));
                 }
@@ -101,10 +102,10 @@ impl Cutter<'_> {
         layout
     }
 
-    /// A stem with as many sides as its radius asks for.
-    pub(crate) fn tube(&self, contour: Option<u32>, radius: f64) -> Tube {
+    /// A stem of a contour, with a neck or none, with as many sides as its radius asks for.
+    pub(crate) fn tube(&self, (contour, neck): (Option<u32>, bool), radius: f64) -> Tube {
         let points = contour.and_then(|i| self.contours.get(i as usize)).map(Vec::as_slice);
-        Tube::new(&cross_section(points, radius, self.accuracy))
+        Tube::new(&cross_section(points, radius, self.accuracy), neck)
     }
 
     fn surface<N: Number>(
@@ -255,10 +256,18 @@ fn stem<N: Number>(tube: &Tube, numbers: &[N], put: &mut impl FnMut(Vector, Vect
     let along = triple(numbers, 2).try_normalize(1e-300).unwrap_or_else(Vector::y);
     let across = triple(numbers, 3).try_normalize(1e-300).unwrap_or_else(|| any_across(&along));
     let axes = [across, along.cross(&across), along];
+    let [lower, upper, narrow] = triple(numbers, 4).into();
+    let length = |end: Vector| (end - ends[0]).dot(&along);
+    let neck = if tube.sizes > 3 { length(triple(numbers, 5)) } else { 0.0 };
+    let sizes = [length(ends[1]), lower, upper, neck, narrow];
     for corner in &tube.corners {
-        let end = usize::from(corner.upper);
-        let radius: f64 = numbers[12 + end].into();
-        put(ends[end] + Corner::turned(corner.place, axes) * radius, Corner::turned(corner.normal, axes));
+        let [height, radius] = corner.sized(&sizes);
+        // At the end itself, which may be beside the direction by rounding.
+        let middle = if corner.shares[0] > 0.0 { ends[1] } else { ends[0] + along * height };
+        let leaning =
+            if neck > 0.0 { along * (corner.slope * (lower - narrow) / neck) } else { Vector::zeros() };
+        let normal = (Corner::turned(corner.normal, axes) + leaning).normalize();
+        put(middle + Corner::turned(corner.place, axes) * radius, normal);
     }
 }
 

@@ -3,6 +3,7 @@
 //! | part | numbers |
 //! |---|---|
 //! | a straight stem | start, end, radius · direction, radius · across, (radius at the start, radius at the end, 0) |
+//! | one with a neck | the same, but for (radius at the start, radius at the end, radius at the end of the neck), end of the neck |
 //! | a polygon | its corners |
 //! | a surface | origin, and the displacements along its three axes from there to the limits of its mesh |
 //! | a patch | 16 control points, row by row |
@@ -23,6 +24,8 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 pub(crate) enum Part {
     /// A piece of a stem, with this contour of the model, or round.
     Stem(Option<u32>),
+    /// The same at a fork, where it begins wider than it is.
+    Shoot(Option<u32>),
     /// A polygon of so many corners.
     Polygon(u32),
     /// A surface, by the place of its mesh in memory.
@@ -38,6 +41,7 @@ impl Part {
     pub(crate) fn numbers(self) -> usize {
         match self {
             Part::Stem(_) => 15,
+            Part::Shoot(_) => 18,
             Part::Polygon(corners) => 3 * corners as usize,
             Part::Surface(_) => 12,
             Part::Patch => 48,
@@ -59,7 +63,7 @@ impl Part {
     fn reach(self, numbers: &[f32]) -> f64 {
         let norm = |i: usize| triple(numbers, i).norm();
         match self {
-            Part::Stem(_) => norm(0).max(norm(1)) + norm(2),
+            Part::Stem(_) | Part::Shoot(_) => norm(0).max(norm(1)) + norm(2),
             Part::Surface(_) => (0..4).map(norm).sum(),
             Part::Polygon(_) | Part::Patch | Part::Net(..) => {
                 (0..numbers.len() / 3).map(norm).fold(0.0, f64::max)

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use dlsys_geometry::scene::{MaterialId, Owner, OwnerId, Point, Scene, Segment, Vector};
+use dlsys_render::{Neck, necks};
 use dlsys_tree::Lineage;
 
 use crate::part::{Frame, Number, Part, Source};
@@ -85,6 +86,8 @@ pub(crate) struct Sampler {
     pub(crate) default_width: f64,
     /// Metres in a unit of the model.
     pub(crate) metres: f64,
+    /// Whether stems go on into shoots at their ends.
+    pub(crate) grown: bool,
 }
 
 impl Sampler {
@@ -102,6 +105,10 @@ impl Sampler {
         elements
     }
 
+    fn necks(&self, scene: &Scene) -> Vec<Option<Neck>> {
+        if self.grown { necks(scene, self.default_width) } else { Vec::new() }
+    }
+
     /// All of a scene as one module, in the coordinates of the scene; no module if it has nothing.
     pub(crate) fn whole<N: Number>(&self, scene: &Scene) -> Sample<N> {
         let mut sample = Sample::default();
@@ -110,13 +117,15 @@ impl Sampler {
         let Owner { name, lineage } = scene.owner(*first);
         let frame = Frame::new(Point::origin(), Vector::y(), -Vector::x());
         sample.modules.push(Module { lineage: *lineage, kind: name.clone(), frame, part: 0, number: 0 });
-        elements.iter().for_each(|(_, element)| self.add(scene, *element, &frame, &mut sample));
+        let necks = self.necks(scene);
+        elements.iter().for_each(|(_, element)| self.add(scene, (*element, &necks), &frame, &mut sample));
         sample
     }
 
     /// The modules of a scene, in the order of its owners.
     pub(crate) fn sample<N: Number>(&self, time: f64, scene: &Scene) -> Sample<N> {
         let elements = self.elements(scene);
+        let necks = self.necks(scene);
         let mut sample = Sample { time, ..Sample::default() };
         for group in elements.chunk_by(|a, b| a.0 == b.0) {
             let frame = self.frame(scene, group);
@@ -124,7 +133,7 @@ impl Sampler {
             let (part, number) = (sample.parts.len() as u32, sample.numbers.len() as u32);
             sample.modules.push(Module { lineage: *lineage, kind: name.clone(), frame, part, number });
             for (_, element) in group {
-                self.add(scene, *element, &frame, &mut sample);
+                self.add(scene, (*element, &necks), &frame, &mut sample);
             }
         }
         sample
@@ -154,7 +163,13 @@ impl Sampler {
         }
     }
 
-    fn add<N: Number>(&self, scene: &Scene, element: Element, frame: &Frame, sample: &mut Sample<N>) {
+    fn add<N: Number>(
+        &self,
+        scene: &Scene,
+        (element, necks): (Element, &[Option<Neck>]),
+        frame: &Frame,
+        sample: &mut Sample<N>,
+    ) {
         let metres = self.metres;
         let numbers = &mut sample.numbers;
         let mut put = |v: Vector| numbers.extend(v.iter().map(|x| N::of(*x)));
@@ -163,13 +178,27 @@ impl Sampler {
             Element::Segment(i) => {
                 let segment = &scene.segments[i];
                 let radii = segment.widths.map(|w| w.resolve(self.default_width) / 2.0 * metres);
-                let radius = radii[0].max(radii[1]);
+                let neck = necks.get(i).copied().flatten();
+                let start = neck.map_or(radii[0], |neck| neck.radius * metres);
+                let radius = start.max(radii[1]);
                 put(point(segment.start));
                 put(point(segment.end));
                 put(frame.local(segment.direction) * radius);
                 put(frame.local(segment.across) * radius);
-                put(Vector::new(radii[0], radii[1], 0.0));
-                (Part::Stem(segment.contour), Some(segment.material))
+                let part = match neck {
+                    Some(neck) => {
+                        let length = (segment.end - segment.start).norm();
+                        let part = if length > 0.0 { neck.length / length } else { 0.0 };
+                        put(Vector::new(start, radii[1], radii[0] + (radii[1] - radii[0]) * part));
+                        put(point(segment.start + segment.direction * neck.length));
+                        Part::Shoot(segment.contour)
+                    }
+                    None => {
+                        put(Vector::new(start, radii[1], 0.0));
+                        Part::Stem(segment.contour)
+                    }
+                };
+                (part, Some(segment.material))
             }
             Element::Polygon(i) => {
                 let polygon = &scene.polygons[i];

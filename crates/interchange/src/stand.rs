@@ -105,7 +105,8 @@ impl Stands {
 /// What a plant draws, without the plants in it; `None` if that is nothing.
 fn look(planted: &Planted, metres: f64, catalogue: &mut Catalogue) -> Option<Look> {
     let plant = &planted.plant;
-    let sample = Sampler { default_width: plant.default_width(), metres }.whole::<f32>(&plant.scene);
+    let sample =
+        Sampler { default_width: plant.default_width(), metres, grown: true }.whole::<f32>(&plant.scene);
     if sample.modules.is_empty() {
         return None;
     }

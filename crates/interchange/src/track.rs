@@ -86,11 +86,11 @@ impl Phase {
         let width = self.width();
         let mut first = 0;
         for part in self.form.iter() {
-            if let Part::Stem(_) = part {
+            if let Part::Stem(_) | Part::Shoot(_) = part {
                 let mut grown: Option<([f32; 6], f32)> = None;
                 for i in (0..self.times.len()).rev() {
                     let own = &mut self.numbers[i * width + first..][..part.numbers()];
-                    let radius = own[12].max(own[13]);
+                    let radius = own[12].max(own[13]).max(own[14]);
                     let length = (triple(own, 1) - triple(own, 0)).norm();
                     match grown {
                         Some((axes, of)) if length <= LONGEST * f64::from(radius) && of > 0.0 => {

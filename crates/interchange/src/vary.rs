@@ -78,7 +78,8 @@ pub(crate) fn vary<T: Send>(
     blank.notes_poses = true;
     blank.accuracy = (1.0 - OF_TRIANGLES) * options.tolerance() / options.metres;
     let (palette, contours) = (blank.palette.clone(), blank.contours.to_vec());
-    let sampler = Sampler { default_width: options.default_width, metres: options.metres };
+    let Options { default_width, metres, grown, .. } = *options;
+    let sampler = Sampler { default_width, metres, grown };
     let draughts = Draughts {
         nursery: &nursery,
         options,

@@ -12,7 +12,7 @@
 use std::collections::HashMap;
 
 use super::forms::Forms;
-use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene};
+use dlsys_geometry::scene::{MaterialId, OwnerId, Point, Scene, Segment};
 use dlsys_render::{CrossSection, Fit, Puff, lengths, puffs};
 
 /// What is placed.
@@ -52,8 +52,11 @@ pub struct Key {
     pub lineage: u64,
     /// The form that it is a copy of.
     pub form: Form,
-    /// How many things of this form the module has drawn before it in the frame.
+    /// How many things of this form the module has drawn before it in the frame; of stems, how many segments.
     pub count: u32,
+    /// Of a length of a stem: its number among those of its segment, the last of which is 0, and how many these are. Where joints come and go, lengths are not taken for
+    /// others.
+    pub length: [u16; 2],
 }
 
 /// Material and variant of a thing at a time.
@@ -100,16 +103,21 @@ impl Stage {
         self.counts.clear();
         // Lengths come stem by stem; a module's are counted in its own order, which lasts.
         let mut stems = lengths(scene, fit);
-        // The last of a segment first: where a joint gets a cross-section more, those towards its parent change places.
         stems.reverse();
-        stems.sort_by_key(|length| length.segment);
-        for length in &stems {
-            let segment = &scene.segments[length.segment];
-            let [start, end] = length.caps.map(u32::from);
-            let finish = Finish { material: Some(segment.material), variant: start + 2 * end };
-            self.begin(scene, segment.owner, Form::Stem(segment.contour), finish);
-            for CrossSection { centre, u, v } in length.ends {
-                [centre.coords, u, v].iter().for_each(|vector| self.numbers.extend(vector.iter()));
+        stems.sort_by_key(|length| length.of);
+        for own in stems.chunk_by(|a, b| a.of == b.of) {
+            let Segment { owner, contour, .. } = scene.segments[own[0].of];
+            let count = self.count(owner, Form::Stem(contour));
+            for (i, length) in own.iter().enumerate() {
+                let material = Some(scene.segments[length.segment].material);
+                let [start, end] = length.caps.map(u32::from);
+                let finish = Finish { material, variant: start + 2 * end };
+                let number = [i, own.len()].map(|n| n.min(usize::from(u16::MAX)) as u16);
+                let key = Key { length: number, ..self.key(scene, owner, Form::Stem(contour), count) };
+                self.items.push(Item { key, finish, first: self.numbers.len() });
+                for CrossSection { centre, u, v } in length.ends {
+                    [centre.coords, u, v].iter().for_each(|vector| self.numbers.extend(vector.iter()));
+                }
             }
         }
         for polygon in &scene.polygons {
@@ -175,10 +183,20 @@ impl Stage {
     }
 
     fn begin(&mut self, scene: &Scene, owner: OwnerId, form: Form, finish: Finish) {
-        let count = self.counts.entry((owner, form)).or_default();
-        let key = Key { lineage: scene.owner(owner).lineage.id, form, count: *count };
-        *count += 1;
+        let count = self.count(owner, form);
+        let key = self.key(scene, owner, form, count);
         self.items.push(Item { key, finish, first: self.numbers.len() });
+    }
+
+    /// How many things of a form a module has drawn before this one.
+    fn count(&mut self, owner: OwnerId, form: Form) -> u32 {
+        let count = self.counts.entry((owner, form)).or_default();
+        *count += 1;
+        *count - 1
+    }
+
+    fn key(&self, scene: &Scene, owner: OwnerId, form: Form, count: u32) -> Key {
+        Key { lineage: scene.owner(owner).lineage.id, form, count, length: [0; 2] }
     }
 
     fn place(&mut self, points: &[Point]) {

@@ -281,17 +281,15 @@ impl Fit {
         self.has_regions
     }
 
+    /// Whether stems join as if they had grown: in drawings with depth or declared light; others are diagrams.
+    pub fn is_grown(&self) -> bool {
+        !self.light.is_flat()
+    }
+
     /// How stems become tubes. Without depth and declared light they are lines of a diagram, and their joints keep their shape.
     pub(super) fn tubes(&self) -> TubeStyle {
         let Fit { default_width, accuracy, .. } = *self;
-        TubeStyle {
-            default_width,
-            sides: 0,
-            accuracy,
-            grown: !self.light.is_flat(),
-            floor: None,
-            steady: false,
-        }
+        TubeStyle { default_width, sides: 0, accuracy, grown: self.is_grown(), floor: None, steady: false }
     }
 
     /// The surroundings of a frame: those of flags, and those that its scene declares.

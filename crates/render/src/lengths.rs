@@ -54,19 +54,36 @@ impl CrossSection {
 /// The part of a stem between two cross-sections.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Length {
-    /// Index among the scene's segments.
+    /// Index among the scene's segments of the one that it looks like.
     pub segment: usize,
+    /// That of the one that it belongs to: at a fork a stem begins within the one that it leaves.
+    pub of: usize,
     /// At the start and at the end.
     pub ends: [CrossSection; 2],
     /// Whether a dome closes the start and the end.
     pub caps: [bool; 2],
 }
 
-/// All stems of a scene, by segment within a stem.
+/// All stems of a scene, by segment within a stem. Where an axis ends in branches, each of these has as many lengths in all frames, however wide and long it is.
 pub fn lengths(scene: &Scene, fit: &Fit) -> Vec<Length> {
     // Sides do not matter, as no corners are made. Joints have the same number of lengths in all frames.
     let tubes = Tubes::new(scene, TubeStyle { sides: 3, steady: true, ..fit.tubes() });
     (0..tubes.len()).flat_map(|i| tubes.lengths(i).collect::<Vec<_>>()).collect()
+}
+
+/// How a stem begins that an axis goes on into at its end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Neck {
+    /// Its radius there, in scene units: not less than its own.
+    pub radius: f64,
+    /// For how long it is wider than its own, in scene units; 0 at a segment without a length.
+    pub length: f64,
+}
+
+/// The necks of the segments of a scene, by number. A segment that an axis may go on into has one whatever its size, so that there is no jump while it grows.
+pub fn necks(scene: &Scene, default_width: f64) -> Vec<Option<Neck>> {
+    let all = super::tube::necks(scene, default_width).into_iter();
+    all.map(|neck| neck.map(|[radius, length]| Neck { radius, length })).collect()
 }
 
 /// The outline of cross-sections of a contour of the model (`None`: a circle), with as many corners as a stem of this
@@ -126,5 +143,58 @@ mod tests {
         assert!(
             (low.ends[0].u.norm() - 0.1).abs() < 1e-12 && (shoulder.ends[1].v.norm() - 0.05).abs() < 1e-12
         );
+    }
+
+    /// A stem and two shoots at its end, of which one has this width and this length.
+    fn fork(width: f64, length: f64) -> Scene {
+        let mut scene = Scene::default();
+        let side = Vector::new(0.5, 0.8, 0.1).normalize();
+        let all = [(Vector::y() * 3.0, 1.0), (Vector::new(-1.0, 2.0, 0.4), 0.8), (side * length, width)];
+        for (i, (way, width)) in all.into_iter().enumerate() {
+            let owner = scene.add_owner(Owner { name: "F".into(), lineage: Lineage::of_axiom(i) });
+            let start = if i > 0 { scene.segments[0].end } else { Point::origin() };
+            scene.segments.push(Segment {
+                start,
+                end: start + way,
+                direction: if i == 2 { side } else { way.normalize() },
+                across: Vector::z(),
+                widths: [Width::Set(width); 2],
+                contour: None,
+                material: MaterialId::STEM,
+                owner,
+                follows: None,
+                grows_from: (i > 0).then_some(0),
+            });
+        }
+        scene
+    }
+
+    /// Whatever the size of a shoot, a fork has as many lengths, which change little by little.
+    #[test]
+    fn a_fork_has_as_many_lengths_in_all_frames() {
+        let mut survey = Survey::new(View::FRONT);
+        survey.add(&fork(0.7, 3.0));
+        let fit = survey.fit();
+        let at = |part: f64, way: fn(f64) -> (f64, f64)| {
+            let (width, length) = way(part);
+            lengths(&fork(width, length), &fit)
+        };
+        let ways: [fn(f64) -> (f64, f64); 3] = [
+            |part| (0.7 * part, 3.0),
+            |part| (0.7, 0.01 + 3.0 * part),
+            |part| (0.8 * part, 0.01 + 3.0 * part),
+        ];
+        for way in ways {
+            let counts =
+                |lengths: &[Length]| [0, 1, 2].map(|of| lengths.iter().filter(|l| l.of == of).count());
+            let last = at(1.0, way);
+            for k in 0..=100 {
+                let now = at(f64::from(k) / 100.0, way);
+                assert_eq!(counts(&now), counts(&last), "{k}");
+                let numbers =
+                    now.iter().flat_map(|l| l.ends).flat_map(|end| [end.centre.coords, end.u, end.v]);
+                assert!(numbers.flat_map(|v| [v.x, v.y, v.z]).all(f64::is_finite), "{k}");
+            }
+        }
     }
 }

@@ -100,7 +100,7 @@ pub use fit::{CAMERA_SHAPE, Fit, Picture, Survey};
 pub use formats::{Companion, Content, Description, Drawing, Exporter, Format};
 pub use frames::{FrameDirectory, MANIFEST, Staged, Staging, aside, replace};
 pub use layout::{Layout, Sheet, Spacing};
-pub use lengths::{CrossSection, Length, cross_section, lengths};
+pub use lengths::{CrossSection, Length, Neck, cross_section, lengths, necks};
 pub use light::Light;
 pub use manifest::{FrameRecord, Manifest};
 pub use motion::{Motion, Positions};

@@ -66,9 +66,19 @@ pub(super) struct Tubes<'s> {
     pub(super) counts: [u32; 2],
 }
 
+/// How segments begin at the end of an axis that goes on into them, by number: the radius there, and for how long they are wider than by themselves. They are all
+/// straight, and have as much of it in all frames.
+pub(super) fn necks(scene: &Scene, default_width: f64) -> Vec<Option<[f64; 2]>> {
+    let style = TubeStyle { default_width, sides: 3, accuracy: 0.0, grown: true, floor: None, steady: true };
+    let structure = Structure::of(&scene.segments, &style, |_| true);
+    (0..scene.segments.len()).map(|i| structure.neck(&scene.segments, i)).collect()
+}
+
 /// A piece of a tube.
 struct Piece {
     part: Part,
+    /// The first segment of its tube, if it is within the stem that this one begins in.
+    of: Option<usize>,
     profile: usize,
     /// The index of the collar that it is within.
     collar: Option<usize>,
@@ -130,12 +140,12 @@ impl<'s> Tubes<'s> {
         if count == 0 {
             return tubes;
         }
-        let structure = Structure::of(segments, style.default_width, style.grown, &kept);
+        let structure = Structure::of(segments, &style, &kept);
         tubes.pieces.reserve(count);
         let mut profiles: HashMap<(Option<u32>, usize), usize> = HashMap::new();
         let (mut members, mut parts) = (Vec::new(), Vec::new());
-        let firsts =
-            (0..segments.len()).filter(|&i| !structure.continues[i] && structure.is_visible(i) && kept(i));
+        let is_seen = |i: usize| structure.is_visible(i, style.steady) && kept(i);
+        let firsts = (0..segments.len()).filter(|&i| !structure.continues[i] && is_seen(i));
         for first in firsts {
             members.clear();
             let next = |&i: &usize| Some(structure.next[i]).filter(|&i| i != NONE);
@@ -149,23 +159,33 @@ impl<'s> Tubes<'s> {
                 tubes.profiles.push(Profile::new(spokes));
                 tubes.profiles.len() - 1
             });
-            let (fork, within) =
-                if style.steady { Default::default() } else { structure.fork(segments, first) };
-            let (begin, collar) = match style.grown {
-                true if !fork.is_empty() => (Begin::Flat, None),
+            let (mut fork, mut within) = structure.fork(segments, first);
+            let is_shoot = !fork.is_empty();
+            let (mut begin, collar) = match style.grown {
+                true if within.part > 0.0 => (Begin::Flat, None),
                 true => structure.beginning(scene, first, &style),
                 false => (Begin::Dome, None),
             };
+            if collar.is_some() {
+                (fork, within) = Default::default();
+            } else if is_shoot {
+                begin = Begin::Flat;
+            }
             members.splice(0..0, fork.iter().copied());
             let radii = &structure.radii;
             let TubeStyle { accuracy, steady, .. } = style;
             let forks = &structure.ends[..];
-            let chain = Chain { segments, radii, members: &members, forks, within, accuracy, steady };
+            let chain =
+                Chain { segments, radii, members: &members, forks, within, accuracy, steady, is_shoot };
             parts.clear();
             chain.parts(style.grown, collar.as_ref(), &mut parts);
+            if steady {
+                chain::merge(&fork, &mut parts);
+            }
             if !fork.is_empty() {
                 chain::begin_within(&fork, segments, &mut parts);
             }
+            chain::end_before(members.last().map_or(0.0, |last| structure.cut(*last)), steady, &mut parts);
             let before = structure.before(segments, first);
             if let Some(&part) = parts.first().filter(|_| style.grown && before > 0.0) {
                 let [start, _] = part.centres;
@@ -178,6 +198,9 @@ impl<'s> Tubes<'s> {
             for (i, part) in parts.iter().enumerate() {
                 let collar = Some(number).filter(|_| part.in_collar);
                 tubes.push(*part, profile, collar, (i == 0).then_some(begin), i + 1 == parts.len());
+                if let Some(piece) = tubes.pieces.last_mut().filter(|_| fork.contains(&part.segment)) {
+                    piece.of = Some(first);
+                }
             }
         }
         tubes
@@ -202,7 +225,16 @@ impl<'s> Tubes<'s> {
         let shape = &self.profiles[profile];
         let start = begins.counts(shape, radii[0]);
         let end = if last { shape.dome(radii[1]) } else { [shape.spokes.len() as u32; 2] };
-        self.pieces.push(Piece { part, profile, collar, section, begins, last, first: self.counts });
+        self.pieces.push(Piece {
+            part,
+            of: None,
+            profile,
+            collar,
+            section,
+            begins,
+            last,
+            first: self.counts,
+        });
         for (count, (a, b)) in self.counts.iter_mut().zip(start.into_iter().zip(end)) {
             *count = count.saturating_add(a.saturating_add(b));
         }
@@ -242,11 +274,13 @@ impl<'s> Tubes<'s> {
                 CrossSection::between(before.part.centres[1], &before.section, &piece.section, radius)
             }
         };
-        let length = |ends, caps| Length { segment: piece.part.segment, ends, caps };
+        let segment = piece.part.segment;
+        let of = piece.of.unwrap_or(segment);
+        let length = |ends, caps| Length { segment, of, ends, caps };
         let cut = match begin {
             Begin::Shoulder => Some(self.end(i - 1)),
             // That of a branch is within its parent, and so is that of an axis that gives way to one.
-            Begin::Flat if self.stands(piece.part.segment) => {
+            Begin::Flat if self.stands(of) => {
                 Some(CrossSection { u: Vector::zeros(), v: Vector::zeros(), ..start })
             }
             _ => None,

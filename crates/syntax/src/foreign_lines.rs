@@ -54,32 +54,62 @@ fn probability(text: &str, start: usize) -> Option<Diagnostic> {
     )
 }
 
-/// The error for a comment of C, if a line of a text begins one: `/* … */`, or `// words`.
-pub fn comment(text: &str) -> Option<Diagnostic> {
-    let mut start = 0;
-    for line in text.split_inclusive('\n') {
-        let body = line.trim_start();
-        let at = start + line.len() - body.len();
-        let is_word = |rest: &str| rest.trim_start().starts_with(|c: char| c.is_alphabetic());
-        let is_comment = body.starts_with("/*") || body.strip_prefix("//").is_some_and(is_word);
-        if is_comment {
-            let error = Diagnostic::error(format!("`{}` begins no comment", &body[..2]))
-                .at(Span::new(at, at + 2), "here it is a turn of the turtle, or a quotient");
-            let help = match text[at..].find("*/").filter(|_| body.starts_with("/*")) {
-                _ if body.starts_with("//") => "a comment begins with `#` and ends with its line",
-                Some(end) if text[at..at + end].contains('\n') => {
-                    "a comment begins with `#` and ends with its line: begin each of these lines with `#`, up to the one with `*/`"
-                }
-                Some(_) => "a comment begins with `#` and ends with its line",
-                None => {
-                    "a comment begins with `#` and ends with its line; this one has no `*/`: begin each line that is meant with `#`"
-                }
-            };
-            return Some(error.help(help));
+/// The errors for comments of C in a text, `/* … */` or lines of `// words`, and the text with spaces in their place; what follows a comment that does not end is
+/// within it. `None` if there is no such comment.
+pub fn comments(text: &str) -> Option<(Vec<Diagnostic>, String)> {
+    let mut errors = Vec::new();
+    let mut rest = String::with_capacity(text.len());
+    let (mut start, mut is_behind_line) = (0, false);
+    while start < text.len() {
+        let line = text[start..].split_inclusive('\n').next().unwrap_or_default();
+        let is_outside = |at: &usize| line[..*at].matches('"').count().is_multiple_of(2);
+        let first = |sign| line.match_indices(sign).map(|(at, _)| at).find(is_outside);
+        let code = &line[..first("#").unwrap_or(line.len())];
+        let body = code.trim_start();
+        if body.strip_prefix("//").is_some_and(|rest| rest.trim_start().starts_with(char::is_alphabetic)) {
+            // Lines in a row are one comment.
+            if !is_behind_line {
+                let at = start + code.len() - body.len();
+                errors.push(no_comment(text, at, "a comment begins with `#` and ends with its line"));
+            }
+            rest.extend(blank(line));
+            (start, is_behind_line) = (start + line.len(), true);
+            continue;
         }
-        start += line.len();
+        is_behind_line = false;
+        let Some(at) = first("/*").filter(|at| *at < code.len()).map(|at| start + at) else {
+            rest.push_str(line);
+            start += line.len();
+            continue;
+        };
+        let end = text[at + 2..].find("*/").map(|length| at + 2 + length + 2);
+        let help = match end {
+            Some(end) if text[at..end].contains('\n') => {
+                "a comment begins with `#` and ends with its line: begin each of these lines with `#`, up to the one with `*/`"
+            }
+            Some(_) => "a comment begins with `#` and ends with its line",
+            None => {
+                "a comment begins with `#` and ends with its line; this one has no `*/`: begin each line that is meant with `#`"
+            }
+        };
+        errors.push(no_comment(text, at, help));
+        let end = end.unwrap_or(text.len());
+        rest.push_str(&text[start..at]);
+        rest.extend(blank(&text[at..end]));
+        start = end;
     }
-    None
+    (!errors.is_empty()).then_some((errors, rest))
+}
+
+fn no_comment(text: &str, at: usize, help: &str) -> Diagnostic {
+    Diagnostic::error(format!("`{}` begins no comment", &text[at..at + 2]))
+        .at(Span::new(at, at + 2), "here it is a turn of the turtle, or a quotient")
+        .help(help)
+}
+
+/// As many bytes of spaces, with the same line breaks.
+fn blank(text: &str) -> impl Iterator<Item = char> + '_ {
+    text.bytes().map(|byte| if byte == b'\n' { '\n' } else { ' ' })
 }
 
 /// A sign that ends something in C, where it is a module of a string here.
@@ -189,11 +219,19 @@ mod tests {
 
     #[test]
     fn comments_of_c_are_told_from_rolls() {
-        for text in ["/* a tree */\nangle 20", "angle 20\n  // Figure 1\n"] {
-            let found = comment(text).expect("a comment");
-            let at = found.labels[0].0.start as usize;
+        for (text, kept) in [
+            ("/* a tree */\nangle 20", "            \nangle 20"),
+            ("angle 20\n  // Figure 1\n// é\nF", "angle 20\n             \n     \nF"),
+            ("F /* a\nb */ G", "F     \n     G"),
+            ("F # /* no\nG /* X", "F # /* no\nG     "),
+            ("t \"#a/*b\" /**/", "t \"#a/*b\"     "),
+        ] {
+            let (found, rest) = comments(text).expect("a comment");
+            assert_eq!((found.len(), &rest[..]), (1, kept), "{text}");
+            let at = found[0].labels[0].0.start as usize;
             assert!(text[at..].starts_with('/'), "{text}");
         }
-        assert!(comment("initial string: F\n//(30) F\n/ F # // no\n").is_none());
+        assert!(comments("initial string: F\n//(30) F\n/ F # // no\n").is_none());
+        assert_eq!(comments("// a\nF\n// b\n/* c */ F /* d").map(|(errors, _)| errors.len()), Some(4));
     }
 }

@@ -19,7 +19,7 @@ use crate::life::{Life, Shape};
 use crate::mesh::{Cutter, Layout, Places};
 use crate::motion::{Clock, Moved};
 use crate::stand::Look;
-use crate::stem::Corner;
+use crate::stem::{Corner, IS_LENGTH, SIZES};
 use crate::{Error, Growth, linear};
 use buffer::{Buffer, Kind};
 use document::{
@@ -40,8 +40,8 @@ struct Writer<'a> {
     document: Document,
     /// Numbers of materials; the floor has none in the palette.
     materials: HashMap<Option<MaterialId>, usize>,
-    /// Numbers of the meshes of stems, by contour, sides and material.
-    stems: BTreeMap<(Option<u32>, usize, MaterialId), usize>,
+    /// Numbers of the meshes of stems, by contour, whether they have a neck, corners and material.
+    stems: BTreeMap<(Option<u32>, bool, usize, MaterialId), usize>,
 }
 
 /// The bytes of the file of a run.
@@ -158,7 +158,9 @@ impl Writer<'_> {
         let number = self.document.meshes.len();
         let kind = plain_name(&life.kind);
         let (shapes, examples) = match &life.shape {
-            Shape::Stem { contour, size, weights } => return self.stem(life, *contour, *size, weights),
+            Shape::Stem { contour, neck, size, weights } => {
+                return self.stem(life, (*contour, *neck), *size, weights);
+            }
             Shape::Still(shape) => (std::slice::from_ref(shape), &[][..]),
             Shape::Mixed { shapes, examples, .. } => (&shapes[..], &examples[..]),
         };
@@ -208,12 +210,14 @@ impl Writer<'_> {
         primitives
     }
 
-    /// The mesh of straight stems: length and radii are 1; its targets make them 0.
-    fn stem(&mut self, life: &Life, contour: Option<u32>, size: f32, weights: &[f32]) -> usize {
-        let thickest = weights.chunks_exact(3).map(|w| 1.0 - w[1].min(w[2])).fold(0.0, f32::max);
-        let tube = self.cutter.tube(contour, f64::from(thickest * size));
+    /// The mesh of straight stems: all sizes are 1; its targets make them 0.
+    fn stem(&mut self, life: &Life, form: (Option<u32>, bool), size: f32, weights: &[f32]) -> usize {
+        let count = life.shape.targets();
+        let radii = weights.chunks_exact(count).flat_map(|own| own.iter().zip(IS_LENGTH));
+        let thickest = radii.filter(|(_, is_length)| !is_length).map(|(w, _)| 1.0 - w).fold(0.0, f32::max);
+        let tube = self.cutter.tube(form, f64::from(thickest * size));
         let material = life.paint.first().copied().flatten().unwrap_or(MaterialId::STEM);
-        let key = (contour, tube.corners.len(), material);
+        let key = (form.0, form.1, tube.corners.len(), material);
         if let Some(&known) = self.stems.get(&key) {
             return known;
         }
@@ -222,21 +226,24 @@ impl Writer<'_> {
             [[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]].map(dlsys_geometry::scene::Vector::from);
         let turned = |of: [f64; 3]| -> [f32; 3] { Corner::turned(of, axes).map(|x| x as f32).into() };
         let side = |corner: &Corner| turned(corner.place);
-        let lift = |corner: &Corner| if corner.upper { 1.0_f32 } else { 0.0 };
         let base = |corner: &Corner| {
-            let [x, y, z] = side(corner);
-            [x, y + lift(corner), z]
+            let [height, radius] = corner.sized(&[1.0; SIZES]).map(|x| x as f32);
+            let [x, y, z] = side(corner).map(|x| x * radius);
+            [x, y + height, z]
         };
-        let without = |shown: bool, v: [f32; 3]| if shown { v.map(|x| 0.0 - x) } else { [0.0; 3] };
+        // What a corner has of a size, taken away.
+        let without = |corner: &Corner, k: usize| -> [f32; 3] {
+            let share = corner.shares[k] as f32;
+            if IS_LENGTH[k] { [0.0, 0.0 - share, 0.0] } else { side(corner).map(|x| 0.0 - x * share) }
+        };
         let corners = &tube.corners;
         let places: Vec<[f32; 3]> = corners.iter().map(base).collect();
         let normals: Vec<[f32; 3]> = corners.iter().map(|c| turned(c.normal)).collect();
-        let targets: [Vec<[f32; 3]>; 3] = [
-            corners.iter().map(|c| [0.0, 0.0 - lift(c), 0.0]).collect(),
-            corners.iter().map(|c| without(!c.upper, side(c))).collect(),
-            corners.iter().map(|c| without(c.upper, side(c))).collect(),
-        ];
-        let targets = targets.map(|t| BTreeMap::from([("POSITION", self.buffer.vectors(&t, Kind::Place))]));
+        let targets = (0..count).map(|k| {
+            let moved: Vec<[f32; 3]> = corners.iter().map(|corner| without(corner, k)).collect();
+            BTreeMap::from([("POSITION", self.buffer.vectors(&moved, Kind::Place))])
+        });
+        let targets: Vec<_> = targets.collect();
         let attributes = BTreeMap::from([
             ("POSITION", self.buffer.vectors(&places, Kind::Place)),
             ("NORMAL", self.buffer.vectors(&normals, Kind::Normal)),
@@ -246,8 +253,7 @@ impl Writer<'_> {
         let number = self.document.meshes.len();
         let name = format!("stem-{number}");
         let material = self.material(Some(material));
-        let primitives =
-            vec![Primitive { attributes, indices, material, mode: None, targets: targets.to_vec() }];
+        let primitives = vec![Primitive { attributes, indices, material, mode: None, targets }];
         self.document.meshes.push(Mesh { name, primitives });
         self.stems.insert(key, number);
         number

@@ -63,10 +63,10 @@ impl Tracks<'_> {
     /// Weights of the shapes, at the ages of the life as far as they are within the animation.
     fn shape(&mut self, moved: &Moved<'_>) {
         let Life { ages, shape, .. } = moved.life;
-        let (count, weights) = match shape {
+        let count = shape.targets();
+        let weights = match shape {
             Shape::Still(_) => return,
-            Shape::Mixed { shapes, weights, .. } => (shapes.len() - 1, weights),
-            Shape::Stem { weights, .. } => (3, weights),
+            Shape::Mixed { weights, .. } | Shape::Stem { weights, .. } => weights,
         };
         let at = |age: f64| -> Vec<f32> {
             let (i, w) = place(ages, age);

@@ -8,7 +8,7 @@ use dlsys_geometry::scene::{MaterialId, Vector};
 use crate::life::{Life, Shape};
 use crate::mesh::{Cutter, Places};
 use crate::part::{distance, reach};
-use crate::stem::Corner;
+use crate::stem::{Corner, IS_LENGTH, SIZES};
 use crate::thin::thin;
 use crate::track::Phase;
 
@@ -59,8 +59,8 @@ pub(super) struct Tolerance {
 /// The mesh of a life, made of the phase that it is the life of.
 pub(super) fn form(life: &Life, phase: &Phase, cutter: &Cutter<'_>, tolerance: Tolerance) -> Form {
     match &life.shape {
-        Shape::Stem { contour, size, weights } => {
-            Form { primitives: vec![stem(life, cutter, (*contour, *size), weights)], size: None }
+        Shape::Stem { contour, neck, size, weights } => {
+            Form { primitives: vec![stem(life, cutter, ((*contour, *neck), *size), weights)], size: None }
         }
         Shape::Still(shape) => {
             Form { primitives: primitives(life, cutter, &[], std::slice::from_ref(shape)), size: None }
@@ -167,21 +167,31 @@ fn complete(normals: &mut [Vec<[f32; 3]>]) {
     }
 }
 
-fn stem(life: &Life, cutter: &Cutter<'_>, (contour, size): (Option<u32>, f32), weights: &[f32]) -> Primitive {
-    let sizes: Vec<[f32; 3]> =
-        weights.as_chunks::<3>().0.iter().map(|own| own.map(|w| (1.0 - w) * size)).collect();
-    let thickest = sizes.iter().map(|[_, a, b]| a.max(*b)).fold(0.0, f32::max);
-    let tube = cutter.tube(contour, f64::from(thickest));
+fn stem(
+    life: &Life,
+    cutter: &Cutter<'_>,
+    (form, size): ((Option<u32>, bool), f32),
+    weights: &[f32],
+) -> Primitive {
+    let sizes = weights.chunks_exact(life.shape.targets()).map(|own| {
+        let mut sizes = [0.0; SIZES];
+        sizes.iter_mut().zip(own).for_each(|(out, w)| *out = f64::from((1.0 - w) * size));
+        sizes
+    });
+    let sizes: Vec<[f64; SIZES]> = sizes.collect();
+    let radii = sizes.iter().flat_map(|own| own.iter().zip(IS_LENGTH)).filter(|(_, is_length)| !is_length);
+    let thickest = radii.map(|(size, _)| *size).fold(0.0, f64::max);
+    let tube = cutter.tube(form, thickest);
     // The frame of a stem: its direction is +Y, across is -X.
     let axes = [-Vector::x(), Vector::z(), Vector::y()];
     let normal = |corner: &Corner| Corner::turned(corner.normal, axes).map(|x| x as f32).into();
     let normals: Vec<[f32; 3]> = tube.corners.iter().map(normal).collect();
-    let place = |corner: &Corner, [length, lower, upper]: [f32; 3]| -> [f32; 3] {
-        let (radius, height) = if corner.upper { (upper, length) } else { (lower, 0.0) };
-        let place = Corner::turned(corner.place, axes) * f64::from(radius) + Vector::y() * f64::from(height);
+    let place = |corner: &Corner, sizes: &[f64; SIZES]| -> [f32; 3] {
+        let [height, radius] = corner.sized(sizes);
+        let place = Corner::turned(corner.place, axes) * radius + Vector::y() * height;
         place.map(|x| x as f32).into()
     };
-    let points = sizes.iter().map(|sizes| tube.corners.iter().map(|corner| place(corner, *sizes)).collect());
+    let points = sizes.iter().map(|sizes| tube.corners.iter().map(|corner| place(corner, sizes)).collect());
     Primitive {
         material: life.paint.first().copied().flatten().unwrap_or(MaterialId::STEM),
         triangles: tube.triangles.iter().flatten().copied().collect(),

@@ -3,7 +3,8 @@
 //!
 //! Blends, tapers and bends depend on places along the stem alone, so they are the same however the stem is divided into segments.
 
-use super::collar::{Collar, Station};
+use super::NONE;
+use super::collar::{Collar, Pieces, Station};
 use dlsys_geometry::scene::{Point, Segment, Vector};
 
 /// Widths that differ by less than this part do not make a step.
@@ -26,6 +27,15 @@ const FORK: f64 = 1.2;
 const FORK_CHANGE: f64 = 3.0;
 /// Pieces of that.
 const FORK_PIECES: f64 = 8.0;
+/// Where there are as many cross-sections in all frames, those of a shoot that an axis may go on into: in parts of the reach of its bend and of its taper,
+/// all on its first segment; a collar has as many.
+const BEND_STATIONS: [f64; 2] = [0.5, 1.0];
+const TAPER_STATIONS: [f64; 4] = [0.2, 0.45, 0.7, 1.0];
+/// Those before the joint: where it begins and those of its bend.
+const RUN_STATIONS: usize = 3;
+/// Pieces of a collar there, and of one elsewhere.
+const SHOOT_PIECES: u8 = (RUN_STATIONS + BEND_STATIONS.len() + TAPER_STATIONS.len() - 1) as u8;
+const COLLAR_PIECES: u8 = 3;
 
 /// A part of a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,6 +65,8 @@ pub(super) struct Chain<'a> {
     /// See [`TubeStyle`](super::TubeStyle).
     pub(super) accuracy: f64,
     pub(super) steady: bool,
+    /// Whether it begins as a shoot that its axis may go on into.
+    pub(super) is_shoot: bool,
 }
 
 /// How a stem begins within another one, which goes on into it and into others.
@@ -167,10 +179,28 @@ fn length_of_blend(radius: f64, height: f64) -> f64 {
     (LENGTH * height).max(LEAST * radius)
 }
 
+/// For how long a shoot tapers behind a fork of a stem of this radius, of which it has so much less.
+pub(super) fn length_of_fork(radius: f64, change: f64) -> f64 {
+    FORK * radius + FORK_CHANGE * change
+}
+
 /// How far from a bend a stem of this radius begins to turn, if it is long enough on both sides.
 pub(super) fn reach_of_bend(directions: [Vector; 2], radius: f64) -> f64 {
     let half = (directions[0] - directions[1]).norm() / 2.0;
     ROUNDING * radius * half / (1.0 - half * half).max(1e-6).sqrt()
+}
+
+/// Places along a stem, moved back as far as it takes that all of them are on its first segment, and apart from one another.
+fn on_first(mut places: Vec<f64>, length: f64) -> Vec<f64> {
+    places.sort_by(f64::total_cmp);
+    let step = length / (places.len() + 1) as f64;
+    let mut low = 0.0;
+    for (k, place) in places.iter_mut().enumerate() {
+        low += 1e-3 * step;
+        *place = place.min(step * (k + 1) as f64).max(low);
+        low = *place;
+    }
+    places
 }
 
 /// Takes from the parts of a chain those of the straight `run` at its beginning up to where the first of the stems that leave it begins to
@@ -197,12 +227,57 @@ pub(super) fn begin_within(run: &[usize], segments: &[Segment], parts: &mut Vec<
     }
 }
 
+/// Makes the straight `run` at the beginning of a chain one segment: cross-sections at the ends of its segments are left out.
+pub(super) fn merge(run: &[usize], parts: &mut Vec<Part>) {
+    let Some(&end) = run.last() else { return };
+    let shared = parts.iter().take_while(|part| run.contains(&part.segment)).count();
+    let mut merged: Vec<Part> = Vec::with_capacity(shared);
+    let mut segment = NONE;
+    for part in parts.drain(..shared) {
+        match merged.last_mut().filter(|_| part.segment != segment) {
+            Some(before) => {
+                (before.centres[1], before.radii[1]) = (part.centres[1], part.radii[1]);
+                before.direction =
+                    (before.centres[1] - before.centres[0]).try_normalize(0.0).unwrap_or(part.direction);
+            }
+            None => merged.push(Part { segment: end, ..part }),
+        }
+        segment = part.segment;
+    }
+    parts.splice(0..0, merged);
+}
+
+/// Ends a stem so far before the end of its last segment; `steady`: with as many parts as it has.
+pub(super) fn end_before(cut: f64, steady: bool, parts: &mut Vec<Part>) {
+    /// Most of a part that is cut off.
+    const MOST_OF_PART: f64 = 0.95;
+    let mut left = cut;
+    while left > 0.0 {
+        let is_only = parts.len() == 1;
+        let Some(part) = parts.last_mut() else { return };
+        let length = (part.centres[1] - part.centres[0]).norm();
+        if !steady && left > MOST_OF_PART * length && !is_only {
+            parts.pop();
+            left -= length;
+            continue;
+        }
+        let rest = 1.0 - (left / length).min(MOST_OF_PART);
+        part.centres[1] = part.centres[0] + (part.centres[1] - part.centres[0]) * rest;
+        part.radii[1] = part.radii[0] + (part.radii[1] - part.radii[0]) * rest;
+        return;
+    }
+}
+
 impl Chain<'_> {
     /// Cuts the chain; plain ones into their segments as they are. `grown`: with blends and round bends.
     pub(super) fn parts(&self, grown: bool, collar: Option<&Collar>, out: &mut Vec<Part>) {
         let count = self.members.len();
         let steps: Vec<usize> = (1..count).filter(|&i| grown && self.steps(i)).collect();
-        let bends = grown && !self.steady && (1..count).any(|i| self.needs_rounding(i));
+        let bends = grown
+            && match self.steady {
+                true => self.within.run > 0,
+                false => (1..count).any(|i| self.needs_rounding(i)),
+            };
         if steps.is_empty() && collar.is_none() && !bends && self.within.run == 0 {
             out.extend(self.members.iter().map(|&i| {
                 let Segment { start, end, direction, .. } = self.segments[i];
@@ -221,14 +296,27 @@ impl Chain<'_> {
         let plain = |at| Station { at, drape: 0.0 };
         let mut stations: Vec<Station> =
             blends.iter().flat_map(|blend| self.stations(blend)).map(plain).collect();
-        stations.extend(bends.iter().flat_map(Bend::stations).map(plain));
         let within = self.within;
         if within.run > 0 {
             stations.push(plain(arcs[within.run] - within.reach.min(0.6 * arcs[within.run])));
         }
+        match bends.first().filter(|_| self.steady) {
+            Some(bend) => stations.extend(self.stations_of_fork(bend, &arcs).map(plain)),
+            None => stations.extend(bends.iter().flat_map(Bend::stations).map(plain)),
+        }
         if let Some(collar) = collar {
             let free = (1..count).find(|&i| steps.first() == Some(&i) || self.turns(i)).unwrap_or(count);
-            stations.extend(collar.stations((!self.steady).then_some(self.accuracy), arcs[free]));
+            let pieces = match (self.steady, self.is_shoot) {
+                (true, true) => Pieces::Fixed(SHOOT_PIECES),
+                (true, false) => Pieces::Fixed(COLLAR_PIECES),
+                (false, _) => Pieces::Within(self.accuracy),
+            };
+            let mut all = collar.stations(pieces, arcs[free]);
+            if self.steady && self.is_shoot {
+                let places = on_first(all.iter().map(|station| station.at).collect(), arcs[1]);
+                all.iter_mut().zip(places).for_each(|(station, at)| station.at = at);
+            }
+            stations.extend(all);
         }
         stations.sort_by(|a, b| a.at.total_cmp(&b.at));
         let own = self.members.get(within.run).map_or(0.0, |first| self.radii[*first][0]);
@@ -289,6 +377,16 @@ impl Chain<'_> {
         }
     }
 
+    /// Where a shoot that its axis goes on into needs cross-sections, as many in all frames.
+    fn stations_of_fork(&self, bend: &Bend, arcs: &[f64]) -> impl Iterator<Item = f64> + use<> {
+        let (at, reach, first) = (bend.at, bend.reach, arcs[bend.member + 1] - bend.at);
+        let taper = bend.taper.map_or(0.0, |taper| taper.reach[1]);
+        let bend = BEND_STATIONS.map(|part| part * reach);
+        let all = bend.into_iter().chain(TAPER_STATIONS.map(|part| part * taper)).collect();
+        let behind = on_first(all, first).into_iter().map(move |place| at + place);
+        BEND_STATIONS.into_iter().map(move |part| at - part * reach).chain(behind)
+    }
+
     /// Whether the width steps between a member and the one before.
     fn steps(&self, i: usize) -> bool {
         let (a, b) = self.radii_at(i);
@@ -321,7 +419,8 @@ impl Chain<'_> {
 
     /// The bends that are rounded, in order.
     fn bends(&self, steps: &[usize], arcs: &[f64]) -> Vec<Bend> {
-        let turns: Vec<usize> = (1..self.members.len()).filter(|&i| self.turns(i)).collect();
+        let is_fork = |i: usize| self.steady && i == self.within.run;
+        let turns: Vec<usize> = (1..self.members.len()).filter(|&i| self.turns(i) || is_fork(i)).collect();
         let bound = |k: Option<usize>, end: usize| arcs[k.map_or(end, |k| turns[k])];
         let mut bends = Vec::new();
         for (k, &i) in turns.iter().enumerate() {
@@ -329,7 +428,9 @@ impl Chain<'_> {
             let (thin, thick) = (a.min(b), a.max(b));
             let steps = steps.binary_search(&i).is_ok();
             // A shoulder stays as it is.
-            if steps && thick - thin > MOST * thin || !self.needs_rounding(i) {
+            let forks = self.forks.binary_search(&self.members[i - 1]).is_ok();
+            let is_plain = steps && thick - thin > MOST * thin && !forks || !self.needs_rounding(i);
+            if !is_fork(i) && (is_plain || self.steady) {
                 continue;
             }
             let back = arcs[i] - bound(k.checked_sub(1), 0);
@@ -337,14 +438,20 @@ impl Chain<'_> {
             let directions = self.directions_at(i);
             let half = (directions[0] - directions[1]).norm() / 2.0;
             let part = if i == self.within.run { self.within.part } else { 1.0 };
-            let reach = reach_of_bend(directions, a.max(b)).min(0.5 * back).min(0.5 * on) * part.max(0.05);
+            let reach = match is_fork(i) {
+                true => reach_of_bend(directions, thick).max(0.1 * thick),
+                false => reach_of_bend(directions, thick),
+            };
+            let reach = reach.min(0.5 * back).min(0.5 * on) * part.max(0.05);
             let point = self.segments[self.members[i]].start;
             // A piece turns by 8 degrees at most.
-            let pieces = (half.asin().to_degrees() / 8.0).ceil().max(1.0);
-            let forks = self.forks.binary_search(&self.members[i - 1]).is_ok();
-            let taper = (steps && thick - thin > self.accuracy).then(|| {
+            let pieces = match is_fork(i) {
+                true => BEND_STATIONS.len() as f64,
+                false => (half.asin().to_degrees() / 8.0).ceil().max(1.0),
+            };
+            let taper = (is_fork(i) || steps && thick - thin > self.accuracy).then(|| {
                 let reach = if forks {
-                    [0.0, (FORK * thick + FORK_CHANGE * (thick - thin)).min(0.9 * on)]
+                    [0.0, length_of_fork(thick, thick - thin).min(0.9 * on)]
                 } else {
                     let long = reach.max(0.5 * length_of_blend(thin, thick - thin));
                     [long.min(0.5 * back).min(0.5 * on); 2]

@@ -27,10 +27,21 @@ const FULL: f64 = 0.4;
 /// What a stem grows from.
 #[derive(Clone, Copy, Debug)]
 enum Parent {
-    /// A stem that ends at the joint and may go on from there; directions are its own, and radii those at the joint.
-    Stem { back: Vector, radius: f64, ahead: Option<(Vector, f64)> },
+    /// A stem that ends at the joint, in a `ball` or not, and may go on from there; directions are its own, and radii those at the joint.
+    Stem { back: Vector, radius: f64, ahead: Option<(Vector, f64)>, ball: bool },
     /// The ground, at this height.
     Ground(f64),
+}
+
+/// How a stem goes on from the joint.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ahead {
+    pub(super) direction: Vector,
+    pub(super) radius: f64,
+    /// How much of it goes on, from 0, nothing, to 1.
+    pub(super) part: f64,
+    /// Whether its axis ends at the joint, and this is a branch.
+    pub(super) ends: bool,
 }
 
 /// A collar of one stem.
@@ -78,18 +89,32 @@ pub(super) struct Station {
     pub(super) drape: f64,
 }
 
+/// How many pieces a collar has.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Pieces {
+    Fixed(u8),
+    Within(f64),
+}
+
 impl Collar {
     /// The collar of a branch with this direction and radius, and this part of its height. `None` if it would be no higher than `accuracy`.
     pub(super) fn of_branch(
         [joint, direction]: [Vector; 2],
         radius: f64,
         parent: (Vector, f64),
-        ahead: Option<(Vector, f64)>,
+        ahead: Option<Ahead>,
         (accuracy, share): (f64, f64),
     ) -> Option<Collar> {
         let (back, thickness) = parent;
         // The one of both directions on whose side the branch is.
-        let (along, wide) = ahead.filter(|(ahead, _)| direction.dot(ahead) > 0.0).unwrap_or(parent);
+        let (along, wide) = match ahead.filter(|ahead| direction.dot(&ahead.direction) > 0.0) {
+            Some(Ahead { direction, radius, part, .. }) if part < 1.0 => {
+                let between = (back * (1.0 - part) + direction * part).try_normalize(1e-9);
+                (between.unwrap_or(back), thickness + (radius - thickness) * part)
+            }
+            Some(Ahead { direction, radius, .. }) => (direction, radius),
+            None => parent,
+        };
         let (sin, cos) = (direction.cross(&along).norm(), direction.dot(&along));
         let part = ((sin - FROM) / (FULL - FROM)).clamp(0.0, 1.0);
         let height = HEIGHT * radius.min(wide) * part * part * (3.0 - 2.0 * part) * share;
@@ -105,7 +130,12 @@ impl Collar {
         let away = (direction * cos - along) / sin;
         let edge = Edge { away, across: direction.cross(&away), sin, cos, wide, middle };
         Some(Collar {
-            parent: Parent::Stem { back, radius: thickness, ahead },
+            parent: Parent::Stem {
+                back,
+                radius: thickness,
+                ahead: ahead.map(|ahead| (ahead.direction, ahead.radius * ahead.part)),
+                ball: ahead.is_some_and(|ahead| ahead.ends),
+            },
             joint: Point::from(joint),
             radius,
             height,
@@ -136,11 +166,13 @@ impl Collar {
     }
 
     /// Where along the stem it needs cross-sections, to be no further than about `accuracy` from its
-    /// shape; `None`: as many in all frames. The stem goes on straight and evenly for the length `free`.
-    pub(super) fn stations(&self, accuracy: Option<f64>, free: f64) -> Vec<Station> {
-        let pieces = match accuracy {
-            None => 3.0,
-            Some(accuracy) => (1.5 * (self.height / accuracy).sqrt()).ceil().clamp(3.0, 12.0),
+    /// shape, or so many pieces, which are as many in all frames. The stem goes on straight and evenly for the length `free`.
+    pub(super) fn stations(&self, pieces: Pieces, free: f64) -> Vec<Station> {
+        let (pieces, begins_inside) = match pieces {
+            Pieces::Fixed(pieces) => (f64::from(pieces), false),
+            Pieces::Within(accuracy) => {
+                ((1.5 * (self.height / accuracy).sqrt()).ceil().clamp(3.0, 12.0), true)
+            }
         };
         let [from, to] = self.between;
         let parts = (0..=pieces as usize).map(|k| k as f64 / pieces);
@@ -154,7 +186,7 @@ impl Collar {
         let outside = outside.map(|part| Station { at: edge.middle + span * part, drape: 1.0 - part });
         // Lengths do without the first: a little of it may be seen at the edge.
         let inside = Station { at: inside, drape: 1.0 };
-        accuracy.map(|_| inside).into_iter().chain(outside).collect()
+        begins_inside.then_some(inside).into_iter().chain(outside).collect()
     }
 
     /// By how much the line of the stem on this side is longer, up to a cross-section with its middle here, than that
@@ -173,7 +205,10 @@ impl Collar {
         let (mut aside, mut axis, mut distance) = (v, Vector::zeros(), f64::INFINITY);
         match self.parent {
             Parent::Ground(height) => (aside, axis, distance) = (Vector::y(), Vector::y(), at.y - height),
-            Parent::Stem { back, radius, ahead } => {
+            Parent::Stem { back, radius, ahead, ball } => {
+                if ball {
+                    distance = v.norm() - radius;
+                }
                 let sides = [Some((-back, radius)), ahead];
                 for (along, radius) in sides.into_iter().flatten() {
                     let far = v.dot(&along);
@@ -240,7 +275,8 @@ mod tests {
     fn collar(angle: f64) -> (Collar, Vector) {
         let direction = Vector::new(angle.sin(), angle.cos(), 0.0);
         let (joint, up) = (Vector::new(0.0, 1.0, 0.0), Vector::y());
-        let collar = Collar::of_branch([joint, direction], 0.5, (up, 1.0), Some((up, 1.0)), (1e-6, 1.0));
+        let ahead = Ahead { direction: up, radius: 1.0, part: 1.0, ends: false };
+        let collar = Collar::of_branch([joint, direction], 0.5, (up, 1.0), Some(ahead), (1e-6, 1.0));
         (collar.expect("high enough"), direction)
     }
 

@@ -1,18 +1,23 @@
 //! How the segments of a scene hang together: which of them share a ring, and how each tube begins.
 
 use super::chain::Within;
-use super::{Begin, Collar, NONE, TubeStyle, can_join, chain};
+use super::collar::Ahead;
+use super::{Begin, Collar, NONE, SHARPEST, TubeStyle, can_join, chain};
 use dlsys_geometry::scene::{Scene, Segment};
 
 /// A branch is wider than what goes on along the axis from this ratio on.
 const TAKES_OVER: f64 = 1.02;
-/// A branch goes on from the end of an axis, which narrows to it, from this part of its width on. Two equal branches that share
-/// the cross-section of their stem have 0.71 of its width, three 0.58.
-const GOES_ON: f64 = 0.5;
-/// Between these parts of its width, a further branch at the end of an axis changes from one that comes out of a collar to one that the axis
-/// goes on into as well; and so it does while it grows in length from what its bend needs to this many times that.
-const PARTS: [f64; 2] = [0.42, 0.62];
-const LONG: f64 = 2.4;
+/// Between these parts of its width, a branch at the end of an axis changes from one that comes out of a collar to one that the axis
+/// goes on into. Two equal branches that share the cross-section of their stem have 0.71 of its width, three 0.58.
+const PARTS: [f64; 2] = [0.42, 0.58];
+/// So do thinner ones, of which there are more, while together they get these parts of its cross-section, and each of them these parts of the width of the
+/// widest.
+const WHOLE: [f64; 2] = [0.5, 0.8];
+const ALIKE: [f64; 2] = [0.6, 0.85];
+/// And so does each while it grows in length from what its bend needs to this many times that.
+const LONG: f64 = 1.8;
+/// Most of a segment that a neck takes.
+const NECK: f64 = 0.9;
 /// Stems that part are straight up to this part of their radius before the first of them turns.
 const STRAIGHT: f64 = 0.3;
 /// A branch that is wider than the axis ever was by this ratio is no limb of it.
@@ -34,23 +39,36 @@ pub(super) struct Structure {
     pub(super) continues: Vec<bool>,
     /// The segment that each leaves as a branch does, although it goes on along its axis, or `NONE`; none if that happens nowhere.
     leaves: Vec<usize>,
-    /// The segment at whose end each bends away beside the branch that goes on from there, or `NONE`; none if that happens nowhere.
+    /// The segment at whose end each bends away with a tube of its own, which begins within that segment, or `NONE`; none if that happens nowhere.
     forks: Vec<usize>,
     /// How far it is between a branch with a collar (0) and one that the axis goes on into (1); none if that happens nowhere.
     parting: Vec<f64>,
-    /// The segments at whose end an axis goes on into branches, in order, and how far before it all of these are still straight.
+    /// The segments at whose end an axis goes on into branches, in order, and what happens there.
     pub(super) ends: Vec<usize>,
-    reaches: Vec<f64>,
+    joints: Vec<Joint>,
+}
+
+/// Where an axis goes on into branches.
+#[derive(Clone, Copy, Debug, Default)]
+struct Joint {
+    /// How far before it all of these are still straight.
+    reach: f64,
+    /// How far before it the axis' own tube ends: further and further while a branch grows, so that its end is within that branch.
+    cut: f64,
+    /// The branch that the axis goes on into most, if any, and how much, to 1.
+    main: usize,
+    part: f64,
+}
+
+/// How much of the axis goes on into a branch of which this is the [`parting`](Structure::parting): from 0 to 1.
+fn part_of(parting: f64) -> f64 {
+    (2.0 * parting - 1.0).max(0.0)
 }
 
 impl Structure {
-    /// Of the segments that are to be `kept`; `grown`: branches may take over.
-    pub(super) fn of(
-        segments: &[Segment],
-        default_width: f64,
-        grown: bool,
-        kept: impl Fn(usize) -> bool,
-    ) -> Structure {
+    /// Of the segments that are to be `kept`, in a style: in one that is grown branches may take over.
+    pub(super) fn of(segments: &[Segment], style: &TubeStyle, kept: impl Fn(usize) -> bool) -> Structure {
+        let TubeStyle { default_width, grown, steady, .. } = *style;
         let radii: Vec<[f64; 2]> =
             segments.iter().map(|s| s.widths.map(|w| w.resolve(default_width) / 2.0)).collect();
         let mut next = vec![NONE; segments.len()];
@@ -80,18 +98,18 @@ impl Structure {
             forks: Vec::new(),
             parting: Vec::new(),
             ends: Vec::new(),
-            reaches: Vec::new(),
+            joints: Vec::new(),
         };
         if grown {
-            structure.give_way(segments, kept);
+            let widest = structure.give_way(segments, &kept);
+            structure.fork_ends(segments, &widest, steady, kept);
         }
         structure
     }
 
     /// Where a branch is wider than what goes on along the axis, the branch is the smooth continuation, and the axis comes out of it in a
-    /// collar. Where an axis ends in branches, the widest of them goes on from it. One that is wider than the axis ever was is no
-    /// limb of it, but an organ.
-    fn give_way(&mut self, segments: &[Segment], kept: impl Fn(usize) -> bool) {
+    /// collar. One that is wider than the axis ever was is no limb of it, but an organ. Returns how wide the axis of each segment has been up to it.
+    fn give_way(&mut self, segments: &[Segment], kept: impl Fn(usize) -> bool) -> Vec<f64> {
         let mut widest: Vec<f64> = Vec::with_capacity(segments.len());
         let mut branches: Vec<usize> = vec![NONE; segments.len()];
         for (i, segment) in segments.iter().enumerate() {
@@ -103,71 +121,120 @@ impl Structure {
                 branches[parent] = i;
             }
         }
-        let mut ends = Vec::new();
         for (parent, &branch) in branches.iter().enumerate().filter(|(_, branch)| **branch != NONE) {
             let axis = self.ahead[parent];
-            let on = if axis == NONE { 0.0 } else { self.radii[axis][0] };
-            let gives_way =
-                if on > 0.0 { self.radii[branch][0] > TAKES_OVER * on } else { self.goes_on(parent, branch) };
-            if !gives_way || !self.is_limb(segments, [parent, branch], &widest) {
+            if axis == NONE || self.radii[axis][0] <= 0.0 {
                 continue;
             }
-            if axis != NONE {
-                self.leaves.resize(segments.len(), NONE);
-                self.leaves[axis] = parent;
-                self.continues[axis] = false;
+            let gives_way = self.radii[branch][0] > TAKES_OVER * self.radii[axis][0];
+            let ends = [parent, branch];
+            if !gives_way || !self.is_limb(segments, ends, &widest) || !self.can_bend(segments, ends) {
+                continue;
             }
-            (self.next[parent], self.ahead[parent], self.continues[branch]) = (branch, branch, true);
-            if axis == NONE {
-                ends.push(parent);
-            }
+            self.leaves.resize(segments.len(), NONE);
+            self.leaves[axis] = parent;
+            self.continues[axis] = false;
+            self.go_on(ends);
         }
-        ends.sort_unstable();
-        self.reaches = ends.iter().map(|&end| self.reach(segments, [end, self.next[end]])).collect();
-        for (i, segment) in segments.iter().enumerate().filter(|(i, _)| !self.continues[*i]) {
-            let Some(parent) = segment.grows_from.filter(|_| segment.follows.is_none() && kept(i)) else {
-                continue;
-            };
-            let Ok(end) = ends.binary_search(&parent) else { continue };
-            if !self.is_limb(segments, [parent, i], &widest) {
-                continue;
-            }
-            self.parting.resize(segments.len(), 0.0);
-            self.parting[i] = self.parts(segments, [parent, i]);
-            if self.parting[i] > 0.5 {
-                self.forks.resize(segments.len(), NONE);
-                self.forks[i] = parent;
-                self.reaches[end] = self.reaches[end].max(self.reach(segments, [parent, i]));
-            }
-        }
-        self.ends = ends;
+        widest
     }
 
-    /// How far a branch at the end of an axis is between one with a collar and one that the axis goes on into. It changes with its size without
+    fn go_on(&mut self, [parent, branch]: [usize; 2]) {
+        (self.next[parent], self.ahead[parent], self.continues[branch]) = (branch, branch, true);
+    }
+
+    /// Where an axis ends in branches, it goes on into them. The widest of those that it goes on into wholly shares its tube, unless joints are
+    /// `steady`.
+    fn fork_ends(
+        &mut self,
+        segments: &[Segment],
+        widest: &[f64],
+        steady: bool,
+        kept: impl Fn(usize) -> bool,
+    ) {
+        let mut shoots: Vec<[usize; 2]> = Vec::new();
+        for (i, segment) in segments.iter().enumerate().filter(|(i, _)| kept(*i)) {
+            let parent = segment.grows_from.filter(|_| segment.follows.is_none());
+            let Some(parent) = parent.filter(|parent| kept(*parent)) else { continue };
+            let ahead = self.ahead[parent];
+            if (ahead == NONE || self.radii[ahead][0] <= 0.0) && self.is_limb(segments, [parent, i], widest) {
+                shoots.push([parent, i]);
+            }
+        }
+        shoots.sort_by_key(|[parent, _]| *parent);
+        if shoots.is_empty() {
+            return;
+        }
+        self.parting.resize(segments.len(), 0.0);
+        self.forks.resize(segments.len(), NONE);
+        for shoots in shoots.chunk_by(|a, b| a[0] == b[0]) {
+            self.part_shoots(segments, shoots);
+        }
+        let mut mains = Vec::new();
+        for shoots in shoots.chunk_by(|a, b| a[0] == b[0]) {
+            let mut joint = Joint::default();
+            for &ends in shoots {
+                let [parent, i] = ends;
+                let part = part_of(self.parting[i]);
+                if part <= 0.0 && !steady {
+                    continue;
+                }
+                self.forks[i] = parent;
+                let wide = self.radii[parent][1].max(self.radii[i][0]);
+                let bend = chain::reach_of_bend(ends.map(|i| segments[i].direction), wide);
+                let [back, on] = self.straight(segments, ends);
+                joint.reach = joint.reach.max(bend + STRAIGHT * wide);
+                joint.cut = joint.cut.max(part * bend.min(0.5 * back).min(0.5 * on));
+                let wider = |than: usize| self.radii[i][0] > self.radii[than][0];
+                if part > joint.part || part > 0.0 && part == joint.part && wider(joint.main) {
+                    (joint.main, joint.part) = (i, part);
+                }
+            }
+            let parent = shoots[0][0];
+            if shoots.iter().any(|[_, i]| self.forks[*i] != NONE) {
+                self.ends.push(parent);
+                self.joints.push(joint);
+            }
+            if joint.part >= 1.0 && !steady {
+                self.forks[joint.main] = NONE;
+                mains.push([parent, joint.main]);
+            }
+        }
+        // Not before, so that how long stems are straight is the same for all.
+        mains.into_iter().for_each(|ends| self.go_on(ends));
+    }
+
+    /// How far each of the branches at the end of an axis is between one with a collar and one that the axis goes on into. It changes with their sizes without
     /// a jump, so that nothing jumps in a film.
-    fn parts(&self, segments: &[Segment], ends: [usize; 2]) -> f64 {
-        let [from, to] = ends.map(|i| segments[i].direction);
-        let (wide, width) = (self.radii[ends[0]][1], self.radii[ends[1]][0]);
-        let half = (from - to).norm() / 2.0;
-        let need = wide * (2.0 * half / (1.0 - half * half).max(1e-6).sqrt()).max(1.0);
-        let long = self.straight(segments, ends).into_iter().fold(f64::INFINITY, f64::min);
-        let smooth = |u: f64| {
-            let u = u.clamp(0.0, 1.0);
+    fn part_shoots(&mut self, segments: &[Segment], shoots: &[[usize; 2]]) {
+        let smooth = |x: f64, [none, all]: [f64; 2]| {
+            let u = ((x - none) / (all - none)).clamp(0.0, 1.0);
             u * u * (3.0 - 2.0 * u)
         };
-        let [least, most] = PARTS;
-        smooth((width / wide - least) / (most - least)) * smooth((long / need - 1.0) / (LONG - 1.0))
-    }
-
-    /// How far before the end of a segment a branch that goes on from there is still straight.
-    fn reach(&self, segments: &[Segment], [parent, branch]: [usize; 2]) -> f64 {
-        let wide = self.radii[parent][1].max(self.radii[branch][0]);
-        chain::reach_of_bend([segments[parent].direction, segments[branch].direction], wide) + STRAIGHT * wide
-    }
-
-    /// Whether a branch is wide enough to go on from the end of an axis.
-    fn goes_on(&self, end: usize, branch: usize) -> bool {
-        self.radii[branch][0] >= GOES_ON * self.radii[end][1]
+        let width = |i: usize| self.radii[i][0];
+        let grown: Vec<f64> = shoots
+            .iter()
+            .map(|ends| {
+                let [from, to] = ends.map(|i| segments[i].direction);
+                let half = (from - to).norm() / 2.0;
+                let bend = 2.0 * half / (1.0 - half * half).max(1e-6).sqrt();
+                let long = self.straight(segments, *ends).into_iter().fold(f64::INFINITY, f64::min);
+                smooth(long / (self.radii[ends[0]][1] * bend.max(1.0)), [1.0, LONG])
+            })
+            .collect();
+        let both = || shoots.iter().zip(&grown);
+        let wide = self.radii[shoots[0][0]][1];
+        let whole = both().map(|([_, i], grown)| (width(*i) / wide).powi(2) * grown).sum::<f64>();
+        let widest = both().map(|([_, i], grown)| width(*i) * grown).fold(0.0, f64::max);
+        let parting: Vec<f64> = both()
+            .map(|([_, i], grown)| {
+                let like = if widest > 0.0 { smooth(width(*i) / widest, ALIKE) } else { 0.0 };
+                grown * smooth(width(*i) / wide, PARTS).max(like * smooth(whole, WHOLE))
+            })
+            .collect();
+        for ([_, i], parting) in shoots.iter().zip(parting) {
+            self.parting[*i] = parting;
+        }
     }
 
     /// Whether a branch may leave a segment, whose axis was as wide as that, smoothly.
@@ -177,7 +244,7 @@ impl Structure {
         end > 0.0
             && width <= LIMB * widest[parent]
             && from.contour == to.contour
-            && self.can_bend(segments, [parent, branch])
+            && from.direction.dot(&to.direction) >= SHARPEST
     }
 
     /// Whether a branch can share the ring at the end of a segment. Where it is not much thinner or thicker, its width tapers through the bend, so that there
@@ -215,7 +282,7 @@ impl Structure {
         let Some(parent) = self.forks.get(first).copied().filter(|parent| *parent != NONE) else {
             return (Vec::new(), Within::default());
         };
-        let reach = self.ends.binary_search(&parent).map_or(0.0, |end| self.reaches[end]);
+        let reach = self.joint(parent).reach;
         let along = segments[parent].direction;
         let before = |at: &usize| {
             let before = segments[*at].follows.filter(|before| self.next[*before] == *at)?;
@@ -223,8 +290,34 @@ impl Structure {
         };
         let mut run: Vec<usize> = std::iter::successors(Some(parent), before).collect();
         run.reverse();
-        let within = Within { run: run.len(), reach, part: 2.0 * self.parting[first] - 1.0 };
+        let within = Within { run: run.len(), reach, part: part_of(self.parting[first]) };
         (run, within)
+    }
+
+    /// What happens at the end of a segment.
+    fn joint(&self, end: usize) -> Joint {
+        self.ends.binary_search(&end).map_or_else(|_| Joint::default(), |at| self.joints[at])
+    }
+
+    /// How far before the end of a segment the tube ends whose last segment this is.
+    pub(super) fn cut(&self, last: usize) -> f64 {
+        self.joint(last).cut
+    }
+
+    /// Whether a tube begins with this segment that may begin within another one.
+    fn is_shoot(&self, first: usize) -> bool {
+        self.forks.get(first).is_some_and(|parent| *parent != NONE)
+    }
+
+    /// How a segment begins at the end of an axis that goes on into it: how wide, and for how long it is wider than by itself.
+    pub(super) fn neck(&self, segments: &[Segment], i: usize) -> Option<[f64; 2]> {
+        let parent = self.forks.get(i).copied().filter(|parent| *parent != NONE)?;
+        let (wide, own) = (self.radii[parent][1], self.radii[i][0]);
+        let change = (wide - own).max(0.0);
+        let wanted = chain::length_of_fork(wide.max(own), change);
+        let length = wanted.min(NECK * (segments[i].end - segments[i].start).norm());
+        // Where there is no room for it, it has less of a shoulder.
+        Some([own + change * part_of(self.parting[i]) * (length / wanted).min(1.0), length])
     }
 
     /// The segment that this one comes out of as a branch.
@@ -252,8 +345,9 @@ impl Structure {
         wanted.min(straight)
     }
 
-    pub(super) fn is_visible(&self, i: usize) -> bool {
-        self.radii[i][0] > 0.0 || self.radii[i][1] > 0.0
+    /// Whether there is anything to see of a segment; `steady`: or may be in another frame, of a joint.
+    pub(super) fn is_visible(&self, i: usize, steady: bool) -> bool {
+        self.radii[i][0] > 0.0 || self.radii[i][1] > 0.0 || steady && self.is_shoot(i)
     }
 
     /// How the tube begins whose first segment this is, and its collar.
@@ -270,13 +364,23 @@ impl Structure {
             return (Begin::Dome, None);
         }
         if let Some(parent) = parent {
+            let joint = self.joint(parent);
             let ahead = Some(self.ahead[parent]).filter(|&i| i != NONE && self.radii[i][0] > 0.0);
+            let (ahead, part) = match joint.part > 0.0 {
+                true => (Some(joint.main), joint.part),
+                false => (ahead, 1.0),
+            };
             // A stem that gets wider at the joint is as wide there as what goes on.
-            let joined = ahead.filter(|&i| self.next[parent] == i).map_or(0.0, |i| self.radii[i][0]);
-            let thickness = self.radii[parent][1].max(joined);
-            let ahead = ahead.map(|i| (scene.segments[i].direction, self.radii[i][0]));
+            let goes_on = |&i: &usize| self.next[parent] == i || joint.part > 0.0;
+            let end = self.radii[parent][1];
+            let wider = ahead.filter(goes_on).map_or(0.0, |i| (self.radii[i][0] - end).max(0.0) * part);
+            let thickness = end + wider;
+            let ahead = ahead.map(|i| {
+                let (direction, radius) = (scene.segments[i].direction, self.radii[i][0]);
+                Ahead { direction, radius, part, ends: joint.part > 0.0 }
+            });
             let back = (scene.segments[parent].direction, thickness);
-            let parting = self.parting.get(first).filter(|_| !style.steady).copied().unwrap_or(0.0);
+            let parting = self.parting.get(first).copied().unwrap_or(0.0);
             let place = [start.coords, segment.direction];
             let part = (1.0 - 2.0 * parting).max(0.0);
             let collar = Collar::of_branch(place, radius, back, ahead, (style.accuracy, part));

@@ -54,9 +54,14 @@ fn tree(pieces: usize) -> Scene {
 }
 
 fn mesh(scene: &Scene, accuracy: f64) -> Triangles {
+    mesh_with(scene, accuracy, 0)
+}
+
+/// With so many sides, or as many as the accuracy takes.
+fn mesh_with(scene: &Scene, accuracy: f64, sides: usize) -> Triangles {
     let mut survey = Survey::new(View::FRONT);
     survey.add(scene);
-    Triangles::of(&Solid::new(scene, &survey.fit().with_accuracy(accuracy), 0), |_| true)
+    Triangles::of(&Solid::new(scene, &survey.fit().with_accuracy(accuracy), sides), |_| true)
 }
 
 /// Volume, and whether every edge is passed once in each direction.
@@ -217,8 +222,9 @@ fn shoots(all: &[(f64, f64)]) -> Scene {
     scene
 }
 
-/// How far away a mesh is along each of some rays towards -x; infinite beside it.
-fn depths(mesh: &Triangles) -> Vec<f64> {
+/// How far away a mesh is along each of some rays towards -x; infinite beside it. Rays are in rows; with `scatter` 1 they are moved about by the distance to the next, so that no
+/// edge passes several at once.
+fn depths(mesh: &Triangles, scatter: f64) -> Vec<f64> {
     let mut depths = vec![f64::INFINITY; 30 * 40];
     for face in &mesh.faces {
         let [p, q, r] = face.corners.map(|(vertex, _)| mesh.vertices[vertex as usize]);
@@ -226,8 +232,14 @@ fn depths(mesh: &Triangles) -> Vec<f64> {
         if area.abs() < 1e-14 {
             continue;
         }
-        for (i, depth) in depths.iter_mut().enumerate() {
-            let (y, z) = (2.0 + 2.0 * (i / 30) as f64 / 40.0, -1.0 + 2.0 * (i % 30) as f64 / 30.0);
+        let rows = [p.y.min(q.y).min(r.y), p.y.max(q.y).max(r.y)].map(|y| (y - 2.0) * 20.0);
+        let (low, high) = (rows[0].floor() as usize, rows[1].ceil() as usize + 1);
+        let rows = low.saturating_sub(1).min(40) * 30..high.min(40) * 30;
+        for i in rows {
+            let depth = &mut depths[i];
+            let [up, aside] = [0.618_034, 0.754_878].map(|part| scatter * (i as f64 * part).fract());
+            let (row, column) = ((i / 30) as f64 + up, (i % 30) as f64 + aside);
+            let (y, z) = (2.0 + 2.0 * row / 40.0, -1.0 + 2.0 * column / 30.0);
             let part = |a: &Point, b: &Point| ((a.y - y) * (b.z - z) - (a.z - z) * (b.y - y)) / area;
             let parts = [part(&q, &r), part(&r, &p), part(&p, &q)];
             if parts.iter().all(|part| *part >= -1e-12) {
@@ -258,7 +270,7 @@ fn shoots_leave_their_stem_without_a_neck() {
         let mesh = mesh(&self::shoots(shoots), 1e-3);
         let (volume, closed) = solid(&mesh);
         assert!(closed && volume > 0.0, "{shoots:?}");
-        let depths = depths(&mesh);
+        let depths = depths(&mesh, 0.0);
         let width = |y: usize| depths[30 * y..30 * y + 30].iter().filter(|depth| depth.is_finite()).count();
         let trunk = width(0);
         for y in 0..20 {
@@ -267,12 +279,15 @@ fn shoots_leave_their_stem_without_a_neck() {
     }
 }
 
-/// A shoot that becomes wider beside another one changes the joint little by little: where it changes most, it changes the less the
-/// less the shoot grows.
-#[test]
-fn a_fork_does_not_jump_while_a_shoot_grows() {
-    let shape = |width: f64| (width, depths(&mesh(&shoots(&[(0.9, 3.0), (width, 3.0)]), 1e-3)));
-    let shapes: Vec<_> = (0..=24).map(|k| shape(0.3 + 0.4 * f64::from(k) / 24.0)).collect();
+/// A fork as it is seen. All stems have as many sides: where the number changes, the shape changes at once, by the accuracy.
+fn seen(all: &[(f64, f64)]) -> Vec<f64> {
+    depths(&mesh_with(&shoots(all), 1e-3, 30), 1.0)
+}
+
+/// The largest change of the shape at once while a number goes from 0 to 1, and where it is: between shapes the distance is halved where the change is largest.
+fn jump(shape: impl Fn(f64) -> Vec<f64>) -> (f64, f64) {
+    let shape = |part: f64| (part, shape(part));
+    let shapes: Vec<_> = (0..=24).map(|k| shape(f64::from(k) / 24.0)).collect();
     let steps = shapes.windows(2).map(|pair| change(&pair[0].1, &pair[1].1));
     let most = steps.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).expect("steps").0;
     let (mut low, mut high) = (shapes[most].clone(), shapes[most + 1].clone());
@@ -283,6 +298,28 @@ fn a_fork_does_not_jump_while_a_shoot_grows() {
             false => low = middle,
         }
     }
-    let jump = change(&low.1, &high.1);
-    assert!(jump < 0.004, "{jump} from {} to {}", low.0, high.0);
+    (change(&low.1, &high.1), low.0)
+}
+
+/// A shoot that becomes wider beside another one, or is the only one, changes the joint little by little: where it changes most, it changes the less the
+/// less the shoot grows.
+#[test]
+fn a_fork_does_not_jump_while_a_shoot_becomes_wider() {
+    let wide = |part: f64| (0.3 + 0.4 * part, 3.0);
+    let (jump_beside, at) = jump(|part| seen(&[(0.9, 3.0), wide(part)]));
+    assert!(jump_beside < 0.004, "{jump_beside} at {at}");
+    let (jump_alone, at) = jump(|part| seen(&[wide(part)]));
+    assert!(jump_alone < 0.004, "{jump_alone} at {at}");
+}
+
+/// And so does one that becomes longer: alone, beside another one, and where it becomes the longer one.
+#[test]
+fn a_fork_does_not_jump_while_a_shoot_becomes_longer() {
+    for (others, width) in [(None, 0.8), (Some((0.9, 3.0)), 0.7), (Some((0.6, 0.7)), 0.8)] {
+        let grown = |part: f64| -> Vec<(f64, f64)> {
+            others.into_iter().chain([(width, 0.3 + 1.2 * part)]).collect()
+        };
+        let (jump, at) = jump(|part| seen(&grown(part)));
+        assert!(jump < 0.004, "{others:?}: {jump} at {at}");
+    }
 }

@@ -54,9 +54,28 @@ pub(super) struct Reader {
 }
 
 impl Reader {
-    /// The items of a text.
+    /// The items of a text. If there are errors and comments of C, these are the errors, with those in the rest of the text: what is within
+    /// a comment says nothing about it.
     pub fn read(&mut self, text: &str) -> Vec<(Item, Span)> {
-        let (before, strays) = (self.errors.len(), self.document.strays.len());
+        let Document { strays, unread, commented, commented_widths, .. } = &self.document;
+        let before = [strays.len(), unread.len(), commented.len(), commented_widths.len()];
+        let errors = self.errors.len();
+        let items = self.read_once(text);
+        if self.errors.len() == errors {
+            return items;
+        }
+        let Some((comments, rest)) = foreign_lines::comments(text) else { return items };
+        let Document { strays, unread, commented, commented_widths, .. } = &mut self.document;
+        strays.truncate(before[0]);
+        unread.truncate(before[1]);
+        commented.truncate(before[2]);
+        commented_widths.truncate(before[3]);
+        self.errors.truncate(errors);
+        self.errors.extend(comments);
+        self.read_once(&rest)
+    }
+
+    fn read_once(&mut self, text: &str) -> Vec<(Item, Span)> {
         let cut = layout(text);
         self.errors.extend(cut.errors);
         if text.contains("#define") {
@@ -116,14 +135,6 @@ impl Reader {
                     self.document.unread.extend(declared_name(&cut.text, item));
                 }
             }
-        }
-        // Errors in the text of a comment say nothing about the comment.
-        if self.errors.len() > before
-            && let Some(error) = foreign_lines::comment(text)
-        {
-            self.errors.truncate(before);
-            self.document.strays.truncate(strays);
-            self.errors.push(error);
         }
         items
     }
