@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use dlsys_geometry::scene::{Owner, OwnerId, Palette, Picture, Scene};
+use rustc_hash::FxHashMap;
 
 /// The names of the modules of a scene, `KIND` + separator + `LINEAGE`: the name of a kind and the
 /// identity of the module ([`Lineage::name`](dlsys_tree::Lineage::name)). They consist of ASCII letters, digits,
@@ -14,7 +15,7 @@ use dlsys_geometry::scene::{Owner, OwnerId, Palette, Picture, Scene};
 pub(super) struct Names<'s> {
     owners: &'s [Owner],
     separator: char,
-    kinds: HashMap<&'s str, String>,
+    kinds: FxHashMap<&'s str, String>,
     /// The names of modules with equal lineages, which is possible only by a collision of hashes.
     shared: HashMap<usize, String>,
 }
@@ -22,7 +23,7 @@ pub(super) struct Names<'s> {
 impl<'s> Names<'s> {
     pub(super) fn new(scene: &'s Scene, separator: char) -> Names<'s> {
         let owners = scene.owners();
-        let mut kinds: HashMap<&str, String> = HashMap::new();
+        let mut kinds: FxHashMap<&str, String> = FxHashMap::default();
         for (i, owner) in owners.iter().enumerate() {
             if i == 0 || !Arc::ptr_eq(&owner.name, &owners[i - 1].name) {
                 kinds.entry(&owner.name).or_insert_with(|| plain(&owner.name));

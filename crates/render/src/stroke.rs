@@ -4,7 +4,6 @@
 //! The colours across a stem depend on its direction and depth only, so they are shared by all stems of about the same; their
 //! position is given by a small gradient of each stem. A stem that is cut in two looks like a whole one.
 
-use std::collections::HashMap;
 use std::fmt::Write;
 
 use super::lighting::Lighting;
@@ -12,6 +11,7 @@ use super::number;
 use super::painter::{DECIMALS, SHADES, Style, text};
 use super::tube::{can_join, stands};
 use dlsys_geometry::scene::{Color, Point, Scene, Segment};
+use rustc_hash::FxHashMap;
 
 /// Stems thinner than this many pixels of the page have one colour.
 const HAIR: f64 = 0.8;
@@ -78,6 +78,9 @@ pub(super) enum End {
     Mitre(usize),
     /// Straight, where the stroke continues or something else hides the rest.
     Straight,
+    /// Cut aslant by what hides the rest: by place across from the left of one who looks up the picture along the stem, at -0.8, -0.4, 0, 0.4 and 0.8 radii
+    /// how far along the stem it is visible from there, or to there, in hundredths of the radius.
+    Slant([i32; 5]),
     /// The flat end of a stem that stands there: the outer half of the ellipse as which a disc is seen.
     Foot,
 }
@@ -92,8 +95,8 @@ pub(super) struct Strokes<'a> {
     /// Shapes of the ends of each segment.
     ends: Vec<[End; 2]>,
     /// Numbers of colours across, and of gradients.
-    profiles: HashMap<[Color; PLACES.len()], usize>,
-    gradients: HashMap<String, usize>,
+    profiles: FxHashMap<[Color; PLACES.len()], usize>,
+    gradients: FxHashMap<String, usize>,
     definitions: String,
 }
 
@@ -137,8 +140,8 @@ impl<'a> Strokes<'a> {
             prefix,
             lighting: None,
             ends,
-            profiles: HashMap::new(),
-            gradients: HashMap::new(),
+            profiles: FxHashMap::default(),
+            gradients: FxHashMap::default(),
             definitions: String::new(),
         }
     }
@@ -184,6 +187,9 @@ impl<'a> Strokes<'a> {
             let along = (to - from).xy().normalize() * (OVERLAP * scale / pixels);
             Point::new(to.x + along.x, to.y + along.y, to.z)
         };
+        if ends.iter().any(|end| matches!(end, End::Slant(_))) {
+            return outline(slanted([a, b], [wa / 2.0, wb / 2.0], ends));
+        }
         let cuts = [0, 1].map(|k| self.cut(segment, k, ends[k]));
         let end_of_outline = || if ends[1] == End::Straight { overlap(a, b) } else { b };
         if from != to {
@@ -417,6 +423,44 @@ fn half_round([a, b]: [Point; 2], r: f64, cut: f64) -> String {
 fn push_cut(data: &mut String, r: f64, cut: f64, [dx, dy]: [f64; 2], [x, y]: [f64; 2]) {
     let across = if dx == 0.0 { 0.0 } else { (-dx).atan2(dy).to_degrees() };
     push(data, "A", &[r, cut, across, 0.0, 1.0, x, y]);
+}
+
+/// The outline of a stroke one or both ends of which are cut aslant.
+fn slanted(places: [Point; 2], radii: [f64; 2], ends: [End; 2]) -> String {
+    /// Places across of the corners: the outer ones are as far along as those at 0.8.
+    const CORNERS: [f64; 5] = [-1.0, -0.4, 0.0, 0.4, 1.0];
+    let [a, b] = places;
+    let along = (b - a).xy().try_normalize(0.0).unwrap_or_default();
+    let mut data = String::new();
+    for (k, end) in ends.into_iter().enumerate() {
+        let (c, r) = (places[k], radii[k]);
+        // From the left to the right at the first end, and back at the last.
+        let turn = if k == 0 { 1.0 } else { -1.0 };
+        let corner = |u: f64, ahead: f64| {
+            [c.x + r * (u * along.y + ahead * along.x), c.y + r * (ahead * along.y - u * along.x)]
+        };
+        let command = if k == 0 { "M" } else { "L" };
+        match end {
+            End::Slant(aslant) => {
+                for i in 0..CORNERS.len() {
+                    let at = if k == 0 { i } else { CORNERS.len() - 1 - i };
+                    let command = if i == 0 { command } else { "L" };
+                    push(&mut data, command, &corner(CORNERS[at], f64::from(aslant[at]) / 100.0));
+                }
+            }
+            End::Round | End::Joint => {
+                push(&mut data, command, &corner(-turn, 0.0));
+                let [x, y] = corner(turn, 0.0);
+                push(&mut data, "A", &[r, r, 0.0, 0.0, 1.0, x, y]);
+            }
+            End::Mitre(_) | End::Straight | End::Foot => {
+                push(&mut data, command, &corner(-turn, 0.0));
+                push(&mut data, "L", &corner(turn, 0.0));
+            }
+        }
+    }
+    data.push('Z');
+    data
 }
 
 /// The outline around two circles and what lies between them, with those of its ends that are cut as far along it as the cuts reach. It turns as all

@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use super::tube::{TubeStyle, Tubes};
 use super::{Fit, triangulate};
-use dlsys_geometry::scene::{Face, MaterialId, OwnerId, Point, Scene, Segment, Surface, Vector};
+use dlsys_geometry::scene::{Face, MaterialId, OwnerId, Point, Scene, Surface, Vector};
 
 /// Takes vertices and normals, in the order of their numbers.
 pub(super) trait Points {
@@ -366,8 +366,8 @@ impl Faces for Triangles {
 }
 
 impl Triangles {
-    /// Everything in a solid, in string order; stems only if they are to be `kept`.
-    pub(super) fn of(solid: &Solid, kept: impl Fn(&Segment) -> bool) -> Triangles {
+    /// Everything in a solid, in string order; stems, by number, only if they are to be `kept`.
+    pub(super) fn of(solid: &Solid, kept: impl Fn(usize) -> bool) -> Triangles {
         let [vertices, normals] = solid.counts.map(|count| count as usize);
         let mut mesh = Triangles {
             vertices: Vec::with_capacity(vertices),
@@ -386,7 +386,7 @@ impl Triangles {
         }
         let mut items = solid.by_owner();
         items.retain(|&n| match solid.item(n as usize) {
-            Item::Stem(piece) => kept(solid.tubes.segment(piece)),
+            Item::Stem(piece) => kept(solid.tubes.segment_number(piece)),
             _ => true,
         });
         solid.faces(&items, &mut mesh, |mesh, owner, material, segment| {

@@ -35,6 +35,9 @@ pub struct Visible<'a> {
     pub placement: [f64; 3],
 }
 
+/// A part of a segment, and the shapes of its ends.
+pub type Part = (Segment, [End; 2]);
+
 /// The side of a stem that is seen at a slant is further in front of its axis than its radius.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Slant {
@@ -42,12 +45,16 @@ enum Slant {
     Hides,
     /// What is a stroke does not hide itself.
     Counts,
+    /// Nor does it there, and its sides are further away than what is between them.
+    Rounds,
 }
 
 /// Which places on a stem are visible, in steps along it.
 struct Seen {
     /// By step: the number of visible places across, and whether the one on the axis is visible.
     steps: Vec<(usize, bool)>,
+    /// By step: which of the places across are visible, as bits.
+    masks: Vec<u8>,
     /// By step: whether the axis is visible or hidden by a stroke.
     open: Vec<bool>,
 }
@@ -81,23 +88,78 @@ impl Visible<'_> {
 
     /// The parts of a segment that nothing hides, and the shapes of their ends: those of the segment where they are its own. A wide
     /// segment is clear, so it is one part.
-    pub fn parts(&self, segment: &Segment, ends: [End; 2], is_thin: bool) -> Vec<(Segment, [End; 2])> {
+    pub fn parts(&self, segment: &Segment, ends: [End; 2], is_thin: bool) -> Vec<Part> {
         let across = if is_thin { &ACROSS[..1] } else { &ACROSS[..] };
         let seen = self.seen(segment, across, Slant::Counts);
         let count = seen.steps.len();
         let [a, ..] = self.placement;
         let reach = UNDER_CELLS + UNDER * pixels_across(segment, self.style) / self.style.pixels * a;
         let ranges = if is_thin { seen.on_axis(reach as usize) } else { seen.range().into_iter().collect() };
-        let cut = |[first, end]: [usize; 2]| {
-            let [from, to] = [first, end].map(|k| k as f64 / count as f64);
-            let shape = |is_own: bool, k: usize| match ends[k] {
-                End::Round if is_own && !self.has_dome(segment, k) => End::Straight,
-                end if is_own => end,
-                _ => End::Straight,
-            };
-            (part(segment, from, to), [shape(first == 0, 0), shape(end == count, 1)])
+        ranges.into_iter().map(|range| self.cut(segment, ends, range, count)).collect()
+    }
+
+    /// The parts of a segment that are visible, which end aslant where something hides it aslant; and those of which a part of the width is visible, and
+    /// a little more. A hair line has no width to hide in part.
+    pub fn over_and_under(&self, segment: &Segment, ends: [End; 2], is_hair: bool) -> [Vec<Part>; 2] {
+        if self.is_beside(segment) {
+            return [vec![(segment.clone(), ends)], Vec::new()];
+        }
+        let across = if is_hair { &ACROSS[..1] } else { &ACROSS[..] };
+        let Seen { steps, masks, .. } = self.seen(segment, across, Slant::Rounds);
+        let [a, ..] = self.placement;
+        let radius = pixels_across(segment, self.style) / self.style.pixels * a / 2.0;
+        let reach = (UNDER_CELLS + 2.0 * radius) as usize;
+        let whole: Vec<Part> = runs(masks.iter().map(|mask| *mask != 0))
+            .into_iter()
+            .flat_map(|run| without_gaps(&masks, run))
+            .map(|run| {
+                let (part, mut shapes) = self.cut(segment, ends, run, steps.len());
+                for (shape, aslant) in shapes.iter_mut().zip(slants(&masks, run)) {
+                    let percent = |steps: i32| (f64::from(steps) / radius * 100.0) as i32;
+                    if !is_hair && aslant != [0; 5] {
+                        *shape = End::Slant(aslant.map(percent));
+                    }
+                }
+                (part, shapes)
+            })
+            .collect();
+        let mut cut = runs(steps.iter().map(|(count, _)| (1..across.len()).contains(count)));
+        for [first, end] in &mut cut {
+            (*first, *end) = (first.saturating_sub(reach), (*end + reach).min(steps.len()));
+        }
+        let under = cut.into_iter().map(|range| self.cut(segment, ends, range, steps.len())).collect();
+        [whole, under]
+    }
+
+    /// Whether a segment is outside of the raster, where nothing hides it.
+    fn is_beside(&self, segment: &Segment) -> bool {
+        let [a, b, c] = self.placement;
+        let radius = 1.0 + [0, 1].map(|k| self.front_cells(segment, k)).into_iter().fold(0.0, f64::max);
+        let ends = [segment.start, segment.end].map(|p| self.style.fit.camera.project(p));
+        let ends = ends.map(|p| [a * p.x + b, c - a * p.y]);
+        (0..2).any(|k| {
+            let size = self.size[k] as f64;
+            ends.iter().all(|end| end[k] < -radius) || ends.iter().all(|end| end[k] > size + radius)
+        })
+    }
+
+    /// Half the width of a segment at one of its ends, in cells.
+    fn front_cells(&self, segment: &Segment, end: usize) -> f64 {
+        let camera = &self.style.fit.camera;
+        let z = camera.project([segment.start, segment.end][end]).z;
+        let radius = segment.widths[end].resolve(self.style.fit.default_width) / 2.0;
+        radius * camera.magnification(z) * self.placement[0]
+    }
+
+    /// The part of a segment between two of so many steps along it, and the shapes of its ends.
+    fn cut(&self, segment: &Segment, ends: [End; 2], [first, end]: [usize; 2], count: usize) -> Part {
+        let [from, to] = [first, end].map(|k| k as f64 / count as f64);
+        let shape = |is_own: bool, k: usize| match ends[k] {
+            End::Round if is_own && !self.has_dome(segment, k) => End::Straight,
+            end if is_own => end,
+            _ => End::Straight,
         };
-        ranges.into_iter().map(cut).collect()
+        (part(segment, from, to), [shape(first == 0, 0), shape(end == count, 1)])
     }
 
     /// Whether the dome at one end of a segment is visible.
@@ -160,7 +222,7 @@ impl Visible<'_> {
         let radius = pixels_across(segment, self.style) / self.style.pixels * a / 2.0;
         let fronts = match slant {
             Slant::Hides => [radius / a / extent; 2],
-            Slant::Counts => [0, 1].map(|k| self.front(segment, k) / extent),
+            Slant::Counts | Slant::Rounds => [0, 1].map(|k| self.front(segment, k) / extent),
         };
         let front = |k: usize| fronts[0] + (fronts[1] - fronts[0]) * ((k as f64 + 0.5) / pieces as f64);
         let aside = if length > 0.0 { [(y2 - y1) / length, (x1 - x2) / length] } else { [1.0, 0.0] };
@@ -171,17 +233,19 @@ impl Visible<'_> {
         let step = |k: usize| {
             let ([x, y], depth) = at(place(k));
             let place = |u: &f64| [x + aside[0] * radius * u, y + aside[1] * radius * u];
-            let mut visible = across.iter().map(|u| self.is_seen(place(u), depth + front(k) + slope));
-            let on_axis = visible.next().unwrap_or(false);
-            (usize::from(on_axis) + visible.filter(|seen| *seen).count(), on_axis)
+            let part = |u: &f64| if slant == Slant::Rounds { (1.0 - u * u).sqrt() } else { 1.0 };
+            let is_seen = |u: &f64| self.is_seen(place(u), depth + front(k) * part(u) + slope);
+            (0..).zip(across).fold(0, |mask, (bit, u)| mask | u8::from(is_seen(u)) << bit)
         };
         let is_stroke = |k: usize| {
             let cell = self.cell(at(place(k)).0);
             cell.and_then(|cell| self.labels.get(cell)) == Some(&COVERED)
         };
-        let steps: Vec<(usize, bool)> = (0..pieces).map(step).collect();
+        let masks: Vec<u8> = (0..pieces).map(step).collect();
+        let steps: Vec<(usize, bool)> =
+            masks.iter().map(|mask| (mask.count_ones() as usize, mask & 1 == 1)).collect();
         let open = (0..pieces).map(|k| steps[k].1 || is_stroke(k)).collect();
-        Seen { steps, open }
+        Seen { steps, masks, open }
     }
 }
 
@@ -212,15 +276,49 @@ impl Seen {
         };
         extend(&mut (0..self.steps.len()));
         extend(&mut (0..self.steps.len()).rev());
-        let mut runs: Vec<[usize; 2]> = Vec::new();
-        for k in (0..shown.len()).filter(|k| shown[*k]) {
-            match runs.last_mut() {
-                Some([_, end]) if *end == k => *end = k + 1,
-                _ => runs.push([k, k + 1]),
-            }
-        }
-        runs
+        runs(shown.into_iter())
     }
+}
+
+/// The runs of what is true: the first of each, and the one after its last.
+fn runs(all: impl Iterator<Item = bool>) -> Vec<[usize; 2]> {
+    let mut runs: Vec<[usize; 2]> = Vec::new();
+    for (k, _) in all.enumerate().filter(|(_, is_in)| *is_in) {
+        match runs.last_mut() {
+            Some([_, end]) if *end == k => *end = k + 1,
+            _ => runs.push([k, k + 1]),
+        }
+    }
+    runs
+}
+
+/// The order of the places across from one side to the other.
+const ASIDE: [usize; 5] = [3, 1, 0, 2, 4];
+
+/// A run of steps in pieces, in each of which what is visible of each place across hangs together.
+fn without_gaps(masks: &[u8], [first, end]: [usize; 2]) -> Vec<[usize; 2]> {
+    let mut cuts = vec![first, end];
+    for bit in 0..ACROSS.len() {
+        let parts = runs(masks[first..end].iter().map(|mask| mask >> bit & 1 == 1));
+        cuts.extend(parts.windows(2).map(|pair| first + (pair[0][1] + pair[1][0]) / 2));
+    }
+    cuts.sort_unstable();
+    cuts.dedup();
+    cuts.windows(2).map(|pair| [pair[0], pair[1]]).collect()
+}
+
+/// How many steps from the first and from the last of a run the first and the last that are visible are, by place across.
+fn slants(masks: &[u8], [first, end]: [usize; 2]) -> [[i32; 5]; 2] {
+    let mut slants = [[0; 5]; 2];
+    for (k, bit) in ASIDE.into_iter().enumerate() {
+        let mut seen = (first..end).filter(|step| masks[*step] >> bit & 1 == 1);
+        let middle = usize::midpoint(first, end);
+        let from = seen.next();
+        let [from, to] = [from.unwrap_or(middle), seen.next_back().or(from).map_or(middle, |last| last + 1)];
+        slants[0][k] = (from - first) as i32;
+        slants[1][k] = to as i32 - end as i32;
+    }
+    slants
 }
 
 /// The part of a segment between two places from 0 to 1.
@@ -234,4 +332,29 @@ fn part(segment: &Segment, from: f64, to: f64) -> Segment {
         [first, _] => first,
     };
     Segment { start: place(from), end: place(to), widths: [width(from), width(to)], ..segment.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_are_parted_where_a_place_across_is_hidden_for_a_while() {
+        let masks = [0, 0b11111, 0b11110, 0b11110, 0b11111, 0];
+        let found = runs(masks.iter().map(|mask| *mask != 0));
+        assert_eq!(found, [[1, 5]]);
+        assert_eq!(without_gaps(&masks, found[0]), [[1, 3], [3, 5]]);
+        assert_eq!(without_gaps(&masks[..4], [1, 4]), [[1, 4]]);
+    }
+
+    #[test]
+    fn an_end_is_aslant_as_its_places_across_are_visible() {
+        // The left side, at -0.8, is visible from the first step on, the right side from the last.
+        let masks = [0b01000, 0b01010, 0b01011, 0b01111, 0b11111];
+        assert_eq!(slants(&masks, [0, 5]), [[0, 1, 2, 3, 4], [0; 5]]);
+        let back: Vec<u8> = masks.iter().rev().copied().collect();
+        assert_eq!(slants(&back, [0, 5]), [[0; 5], [0, -1, -2, -3, -4]]);
+        // A place that is visible nowhere takes no room.
+        assert_eq!(slants(&[0b00001; 4], [0, 4]), [[2, 2, 0, 2, 2], [-2, -2, 0, -2, -2]]);
+    }
 }

@@ -11,20 +11,23 @@
 //! between faces, and a file has as many paths as there are shades to see, not as there are triangles.
 //!
 //! Stems that nothing hides are no regions: they are strokes, over everything else. So are thin ones, where nothing is in front of
-//! them.
+//! them. In a scene of nothing but stems all are strokes but wide ones ([`stems`]), from back to front ([`order`]); those that regions hide in part are
+//! under these, too.
 
 mod contour;
 mod hidden;
 mod label;
 mod memory;
+mod order;
 mod path;
 mod regions;
 mod scarce;
 mod specks;
+mod stems;
 mod tones;
 
 use std::borrow::Cow;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::fmt::Write;
 
 use super::Fit;
@@ -33,17 +36,18 @@ use super::lens::Lens;
 use super::lighting::Lighting;
 use super::name::Names;
 use super::painter::Style;
-use super::stroke::{Stroke, Strokes, is_thin, pixels_across};
+use super::stroke::{End, Stroke, Strokes, is_thin, pixels_across};
 use super::triangles::{Solid, Triangles};
 use super::tube::{TubeStyle, Tubes, sides_for};
 use contour::Corner;
 use dlsys_geometry::scene::{Face, OwnerId, Point, Scene, Segment};
-use hidden::Visible;
+use hidden::{Part, Visible};
 use label::{Look, Stems};
 pub(super) use memory::Memory;
 use memory::Rasters;
 use path::push_outline;
 use regions::Regions;
+use stems::Plan;
 use tones::Tones;
 
 /// Cells for each pixel of the page, along a side.
@@ -66,6 +70,16 @@ const LEAST_PIXELS: f64 = 1.5;
 
 /// The elements of a scene in depth, one a line. See [`painter::elements`](super::painter::elements).
 pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -> String {
+    let plan = Plan::of(scene, style);
+    if let Some(plan) = plan.as_ref().filter(|plan| !plan.has_regions()) {
+        let mut page = PageWriter::new(scene, style, named);
+        let mut strokes = Strokes::new(scene, style, prefix, |_, _| true);
+        for &index in &plan.strokes {
+            let segment = &scene.segments[index];
+            page.stroke(segment.owner, segment, strokes.ends(index), &mut strokes);
+        }
+        return page.finish(strokes);
+    }
     let [left, bottom, width, height] = style.fit.picture.area;
     let larger = width.max(height);
     let cell_of = |per_pixel: f64| {
@@ -73,8 +87,12 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         larger / (per_pixel * larger * style.pixels).clamp(least, MOST_CELLS)
     };
     let finest = cell_of(CELLS_PER_PIXEL);
-    let has_triangles = |segment: &Segment| pixels_across(segment, style) >= LEAST_PIXELS;
-    let mesh = mesh(scene, style.fit, 1.0 / finest, has_triangles);
+    let has_triangles = |i: usize| match &plan {
+        Some(plan) => plan.is_region[i],
+        None => pixels_across(&scene.segments[i], style) >= LEAST_PIXELS,
+    };
+    let is_near = |i: usize| plan.as_ref().is_none_or(|plan| plan.is_near[i]);
+    let mesh = mesh(scene, style.fit, 1.0 / finest, is_near, has_triangles);
     let is_fine = mesh.faces.len() > PLAIN;
     let cell = if is_fine { finest } else { cell_of(1.0) };
     // Cells in a pixel of the page.
@@ -93,7 +111,10 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let mut rasters = style.memory.map(Memory::take).unwrap_or_default();
     let nearest = label::nearest(&mesh, &lit, size, &mut rasters);
     let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };
-    let stems = stems(scene, style, &visible, lit.lighting().is_declared());
+    let stems = match &plan {
+        Some(_) => Stems::default(),
+        None => stems(scene, style, &visible, lit.lighting().is_declared()),
+    };
     let tones = Tones::of(&scene.palette);
     let (mut regions, shades) = label::label(
         &mesh,
@@ -114,11 +135,17 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let to_page = |[x, y]: Corner| [origin[0] + x * unit, origin[1] + y * unit];
     // A quarter of a cell.
     let decimals = (-(unit / 4.0).log10()).ceil().clamp(0.0, 6.0) as usize;
-    let is_stroke = |segment: &Segment| {
-        stems.strokes.contains(&(segment.owner, segment.material))
-            || pixels_across(segment, style) < LEAST_PIXELS
+    let is_stroke = |i: usize| {
+        let segment = &scene.segments[i];
+        match &plan {
+            Some(plan) => !plan.is_region[i],
+            None => {
+                stems.strokes.contains(&(segment.owner, segment.material))
+                    || pixels_across(segment, style) < LEAST_PIXELS
+            }
+        }
     };
-    let parted = |a: usize, b: usize| is_stroke(&scene.segments[a]) && is_stroke(&scene.segments[b]);
+    let parted = |a: usize, b: usize| is_stroke(a) && is_stroke(b);
     let mut strokes = Strokes::new(scene, style, prefix, parted).lit(lit.lighting());
     let mut paths: Vec<(OwnerId, String)> = Vec::new();
     for (shade, outlines) in shades.iter().zip(&outlines).filter(|(_, outlines)| !outlines.is_empty()) {
@@ -134,15 +161,21 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         outlines.iter().for_each(|outline| push_outline(&mut data, outline, to_page, decimals));
         paths.push((owner, format!("<path fill=\"{fill}\" d=\"{data}\"/>")));
     }
-    let mut page = PageWriter {
-        style,
-        names: named.then(|| Names::new(scene, '-')),
-        ordinals: HashMap::new(),
-        out: String::new(),
-    };
+    let mut page = PageWriter::new(scene, style, named);
+    let over = plan.as_ref().map(|plan| page.under_regions(scene, &plan.strokes, &mut strokes, &visible));
     page.groups(&paths);
-    let order = (0..scene.segments.len()).filter(|i| is_stroke(&scene.segments[*i])).collect();
-    let elements = page.with_strokes(scene, order, strokes, &visible);
+    match over {
+        Some(over) => over.iter().for_each(|(owner, parts)| page.strokes(*owner, parts, &mut strokes)),
+        None => {
+            let order = (0..scene.segments.len()).filter(|i| is_stroke(*i)).collect();
+            for i in by_depth(scene, style, order) {
+                let segment = &scene.segments[i];
+                let parts = visible.parts(segment, strokes.ends(i), is_thin(segment, style));
+                page.strokes(segment.owner, &parts, &mut strokes);
+            }
+        }
+    }
+    let elements = page.finish(strokes);
     if let Some(memory) = style.memory {
         let Regions { labels, places, strengths, .. } = regions;
         let (numbers, depths) = (nearest.numbers, nearest.depths);
@@ -151,15 +184,32 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     elements
 }
 
-/// Everything in a scene as triangles, in string order, as round as so many cells for a scene unit show; stems if they are to be `kept`.
-fn mesh(scene: &Scene, fit: &Fit, scale: f64, kept: impl Fn(&Segment) -> bool) -> Triangles {
+/// Segments from back to front, as far as the depths of their middles tell.
+fn by_depth(scene: &Scene, style: Style, mut numbers: Vec<usize>) -> Vec<usize> {
+    let depth = |i: usize| {
+        let segment = &scene.segments[i];
+        style.fit.camera.project(nalgebra::center(&segment.start, &segment.end)).z
+    };
+    numbers.sort_by(|a, b| depth(*a).total_cmp(&depth(*b)).then(a.cmp(b)));
+    numbers
+}
+
+/// Everything in a scene as triangles, in string order, as round as so many cells for a scene unit show; stems, by number, if they are to be `kept`.
+/// Others that are `near` give the joints of these their shape.
+fn mesh(
+    scene: &Scene,
+    fit: &Fit,
+    scale: f64,
+    near: impl Fn(usize) -> bool,
+    kept: impl Fn(usize) -> bool,
+) -> Triangles {
     let affordable = (MOST_TRIANGLES / (2 * scene.segments.len().max(1))).clamp(4, MOST_SIDES);
     let sides = |radius: f64, at: Point| {
         let nearer = fit.camera.magnification(fit.camera.project(at).z);
         sides_for(radius * scale * nearer, ROUNDNESS).min(affordable)
     };
     let style = TubeStyle { floor: scene.surroundings.floor, ..fit.tubes() };
-    let tubes = Tubes::of(scene, style, sides, |_| true);
+    let tubes = Tubes::of(scene, style, sides, near);
     Triangles::of(&Solid::of(scene, tubes, Cow::Borrowed(&scene.surfaces)), kept)
 }
 
@@ -223,21 +273,29 @@ fn stems(scene: &Scene, style: Style, visible: &Visible, is_declared: bool) -> S
 struct PageWriter<'a> {
     style: Style<'a>,
     names: Option<Names<'a>>,
-    /// Elements of each module so far.
-    ordinals: HashMap<OwnerId, u32>,
+    /// Elements of each module so far; none in a picture without names.
+    ordinals: Vec<u32>,
     out: String,
 }
 
-impl PageWriter<'_> {
-    /// The `id` of the next element of a module: its name, then its name and a number from 2. Empty in a picture without names.
-    fn id(&mut self, owner: OwnerId) -> String {
-        let Some(names) = &self.names else { return String::new() };
-        let ordinal = self.ordinals.entry(owner).or_default();
+impl<'a> PageWriter<'a> {
+    fn new(scene: &'a Scene, style: Style<'a>, named: bool) -> PageWriter<'a> {
+        let names = named.then(|| Names::new(scene, '-'));
+        let ordinals = vec![0; if named { scene.owners().len() } else { 0 }];
+        PageWriter { style, names, ordinals, out: String::new() }
+    }
+
+    /// Appends the `id` of the next element of a module: its name, then its name and a number from 2. Nothing in a picture without names.
+    fn push_id(&mut self, owner: OwnerId) {
+        let Some(names) = &self.names else { return };
+        self.out.push_str(" id=\"");
+        self.out.push_str(&names.get(owner));
+        let ordinal = &mut self.ordinals[owner.index()];
         *ordinal += 1;
-        match ordinal {
-            1 => format!(" id=\"{}\"", names.get(owner)),
-            ordinal => format!(" id=\"{}.{ordinal}\"", names.get(owner)),
+        if *ordinal > 1 {
+            let _ = write!(self.out, ".{ordinal}");
         }
+        self.out.push('"');
     }
 
     /// The paths of each module, in a group that has its name.
@@ -250,10 +308,11 @@ impl PageWriter<'_> {
 
     /// Elements of one module that have one name.
     fn group(&mut self, owner: OwnerId, lines: &[impl std::fmt::Display]) {
-        let id = self.id(owner);
-        let is_group = !id.is_empty();
+        let is_group = self.names.is_some();
         if is_group {
-            let _ = writeln!(self.out, "<g{id}>");
+            self.out.push_str("<g");
+            self.push_id(owner);
+            self.out.push_str(">\n");
         }
         for line in lines {
             let _ = writeln!(self.out, "{line}");
@@ -263,35 +322,58 @@ impl PageWriter<'_> {
         }
     }
 
-    /// Adds the visible parts of stems that are strokes, by number, from back to front, and completes the elements.
-    fn with_strokes(
-        mut self,
+    /// Adds what regions hide in part, to come under these regions, so that no background shows along their edges; and gives the parts that nothing hides,
+    /// which come over all regions.
+    fn under_regions(
+        &mut self,
         scene: &Scene,
-        mut order: Vec<usize>,
-        mut strokes: Strokes,
+        order: &[usize],
+        strokes: &mut Strokes,
         visible: &Visible,
-    ) -> String {
-        let style = self.style;
-        let depth = |i: usize| {
-            let segment = &scene.segments[i];
-            style.fit.camera.project(nalgebra::center(&segment.start, &segment.end)).z
-        };
-        order.sort_by(|a, b| depth(*a).total_cmp(&depth(*b)).then(a.cmp(b)));
-        for index in order {
+    ) -> Vec<(OwnerId, Vec<Part>)> {
+        let parted = order.iter().map(|&index| {
             let segment = &scene.segments[index];
-            let parts = visible.parts(segment, strokes.ends(index), is_thin(segment, style));
-            let elements: Vec<(&str, String)> = (parts.iter())
-                .filter_map(|(part, ends)| strokes.stroke(part, *ends, false))
-                .map(Stroke::element)
-                .collect();
-            if let [(name, attributes)] = &elements[..] {
-                let id = self.id(segment.owner);
-                let _ = writeln!(self.out, "<{name}{id}{attributes}/>");
-            } else if !elements.is_empty() {
-                let line = |(name, attributes): &(&str, String)| format!("<{name}{attributes}/>");
-                self.group(segment.owner, &elements.iter().map(line).collect::<Vec<_>>());
-            }
+            let is_hair = pixels_across(segment, self.style) < LEAST_PIXELS;
+            let [over, under] = visible.over_and_under(segment, strokes.ends(index), is_hair);
+            self.strokes(segment.owner, &under, strokes);
+            (segment.owner, over)
+        });
+        parted.collect()
+    }
+
+    /// The parts of a segment as strokes.
+    fn strokes(&mut self, owner: OwnerId, parts: &[Part], strokes: &mut Strokes) {
+        if let [(part, ends)] = parts {
+            self.stroke(owner, part, *ends, strokes);
+            return;
         }
+        let elements: Vec<(&str, String)> = (parts.iter())
+            .filter_map(|(part, ends)| strokes.stroke(part, *ends, false))
+            .map(Stroke::element)
+            .collect();
+        if let [element] = &elements[..] {
+            self.element(owner, element);
+        } else if !elements.is_empty() {
+            let line = |(name, attributes): &(&str, String)| format!("<{name}{attributes}/>");
+            self.group(owner, &elements.iter().map(line).collect::<Vec<_>>());
+        }
+    }
+
+    /// A whole segment as a stroke.
+    fn stroke(&mut self, owner: OwnerId, segment: &Segment, ends: [End; 2], strokes: &mut Strokes) {
+        if let Some(stroke) = strokes.stroke(segment, ends, false) {
+            self.element(owner, &stroke.element());
+        }
+    }
+
+    fn element(&mut self, owner: OwnerId, (name, attributes): &(&str, String)) {
+        self.out.extend(["<", name]);
+        self.push_id(owner);
+        self.out.extend([attributes, "/>\n"]);
+    }
+
+    /// The elements so far, and the gradients of strokes before them.
+    fn finish(self, mut strokes: Strokes) -> String {
         let definitions = strokes.definitions();
         match definitions.is_empty() {
             true => self.out,
