@@ -40,7 +40,7 @@ fn poles_and_edges_of_definedness_hide_no_event_and_make_none() {
         ("A(0)\nA(x): solve dx/dt = 1\n if 1/(x - 0.5) = 5 produce B(t)", Some(0.7)),
         ("A\nA: if 1/(t - 1) = 0 produce B(t)", None),
         // A jump over a value is no equality; arriving at it is.
-        ("A(0)\nA(x): solve dx/dt = 1\n if floor(x) = 0.5 produce B(t)", None),
+        ("A(0)\nA(x): solve dx/dt = 1\n if x - x + floor(x) = 0.5 produce B(t)", None),
         ("A(0)\nA(x): solve dx/dt = 1\n if floor(x) = 1 produce B(t)", Some(1.0)),
     ] {
         let found = time_of_event(&format!("initial string: {text}"), 1.9);
@@ -155,7 +155,7 @@ fn twins_are_integrated_once_and_live_as_if_they_were_alone() {
     // Each life ends in two equals, or in one; with another beside it that is born with another value, and one that dies.
     let text = |heirs: &str| {
         format!(
-            "initial string: A(0.1, 1)\nA(x, y):\n if x < 1 solve dx/dt = 0.7*x*(1.3 - x)*exp(-0.2*x) + 0.05*sin(age), \
+            "initial string: A(0.1, 1) B(0.5)\nA(x, y):\n if x < 1 solve dx/dt = 0.7*x*(1.3 - x)*exp(-0.2*x) + 0.05*sin(age), \
              dy/dt = -y\n if x = 1 produce {heirs}\nB(x):\n if x > 0.3 solve dx/dt = -sqrt(x)\n if x = 0.3 produce C"
         )
     };
