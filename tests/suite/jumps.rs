@@ -1,7 +1,8 @@
 //! What jumps, in rates, values, conditions and successors: `floor`, `ceil`, `sign`, elements of arrays, comparisons that rest at equality.
 //! Each against the solution by hand.
 
-use crate::common::{Plain, fails, run};
+use crate::common::{Plain, run};
+use crate::semantics::fails;
 use dlsys::sim::{Error, Method, Settings};
 
 fn at(text: &str, t: f64) -> Vec<Plain> {

@@ -158,11 +158,11 @@ impl Rates for Independent<'_> {
 }
 
 /// The first position in a step, from 0 to 1, from which on a pulse may have been overlooked. A rule whose rates cannot
-/// be bounded in steps that have been cut often enough is recorded.
-fn overlooked(detector: &mut Detector, step: &ExaminedStep, rule: usize, tries: usize) -> Option<f64> {
+/// be bounded in steps that have been cut often enough, or that are as short as steps can be, is recorded.
+fn overlooked(detector: &mut Detector, step: &ExaminedStep, rule: usize, is_last: bool) -> Option<f64> {
     match detector.pulses.examine(step) {
         PulseFinding::Clear => None,
-        PulseFinding::Unbounded(at) if tries > MAX_UNBOUNDED => {
+        PulseFinding::Unbounded(at) if is_last => {
             let h = step.own.map_or(0.0, |dense| dense.h);
             detector.unbounded.entry(rule).or_insert(step.start.to_f64() + at * h);
             None
@@ -298,7 +298,8 @@ impl FlowStage<'_, '_> {
             let stages = Stages::of(integrator);
             let examined = ExaminedStep::alone(self.world, id, dense, stages, conditions);
             let Some(examined) = examined else { break step };
-            match overlooked(self.detector, &examined, index, tries) {
+            let is_last = tries > MAX_UNBOUNDED || dense.h <= least;
+            match overlooked(self.detector, &examined, index, is_last) {
                 Some(at) if dense.h > least => {
                     stats.rejected += 1;
                     let part = if at > 0.0 { at } else { 0.25 };

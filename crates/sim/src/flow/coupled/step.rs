@@ -158,12 +158,13 @@ impl FlowStage<'_, '_> {
         let conditions = Conditions::new(&self.setup.model.rules, settings, stiff);
         let end = self.world.coupled.as_ref().map_or(from, |solution| solution.end);
         let (span, stages) = ([from, end], Stages::of(integrator));
+        let least = 64.0 * from.resolution();
         let overlooked = pulsing.iter().filter_map(|id| {
             let step = ExaminedStep::coupled(self.world, *id, span, stages, conditions)?;
             match self.detector.pulses.examine(&step) {
                 PulseFinding::Clear => None,
                 PulseFinding::Overlooked(at) => Some(at),
-                PulseFinding::Unbounded(at) if tries <= MAX_UNBOUNDED => Some(at),
+                PulseFinding::Unbounded(at) if tries <= MAX_UNBOUNDED && h > least => Some(at),
                 PulseFinding::Unbounded(at) => {
                     let rule = self.world.state(*id).and_then(|s| s.rule).unwrap_or(0);
                     self.detector.unbounded.entry(rule).or_insert(from.to_f64() + at * h);
