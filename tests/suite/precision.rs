@@ -175,3 +175,32 @@ fn twins_are_integrated_once_and_live_as_if_they_were_alone() {
     let (mixed, _) = at_end("A(0.1, 1) B(0.5) A(0.1, 1) A(0.11, 1)");
     assert!(mixed.iter().filter(|m| **m == one[0]).count() >= twins.len(), "{}", mixed.len());
 }
+
+#[test]
+fn what_only_adds_up_is_right_after_many_periods() {
+    // What errs in a sum stays, however large the sum has become: a tolerance relative to that grows beyond what a period adds. The integral of
+    // sqrt(1.1 + sin t) over a period, by adaptive quadrature.
+    let period = 6.133_590_949_001_918;
+    for (periods, allowed) in [(100.0, 1e-7), (1000.0, 1e-6)] {
+        let text = "initial string: A(0)\nA(x): solve dx/dt = sqrt(1.1 + sin(t))";
+        let strings = run(text, Settings::default(), &[2.0 * std::f64::consts::PI * periods]).expect("runs");
+        let error = strings[0][0].1[0] / (period * periods) - 1.0;
+        assert!(error.abs() < allowed, "{periods}: {error}");
+    }
+    // Thermal time over ten years of days, which follow the year and the hour, by the trapezium rule on a fine grid; beside a value that is read.
+    let degrees = "12 - 9*cos(2*pi*t/365.25) - 5*cos(2*pi*t)";
+    let text = format!(
+        "initial string: A(0, 1)\nA(x, y): solve dx/dt = 2^(({degrees} - 20)/10), dy/dt = 0.001*y*sin(t)"
+    );
+    let rate = |t: f64| {
+        let turn = 2.0 * std::f64::consts::PI * t;
+        2f64.powf((12.0 - 9.0 * (turn / 365.25).cos() - 5.0 * turn.cos() - 20.0) / 10.0)
+    };
+    let (days, parts) = (3650, 64);
+    let h = 1.0 / f64::from(parts);
+    let inner: f64 = (1..days * parts).map(|i| rate(f64::from(i) * h)).sum();
+    let exact = h * (inner + 0.5 * (rate(0.0) + rate(f64::from(days))));
+    let strings = run(&text, Settings::default(), &[f64::from(days)]).expect("runs");
+    let error = strings[0][0].1[0] / exact - 1.0;
+    assert!(error.abs() < 2e-6, "{error}");
+}

@@ -29,6 +29,10 @@ pub trait Rates {
         false
     }
 
+    /// Marks the components that no rate reads, not their own either. What errs in them stays and adds up, so it is tolerated in proportion to
+    /// how far they go in a step, not to how far they have come. None by default.
+    fn mark_sums(&self, _is_sum: &mut [bool]) {}
+
     /// True if unknowns are solved for along with the components. False by default.
     fn is_algebraic(&self) -> bool {
         false
@@ -60,5 +64,9 @@ impl<R: Rates> Rates for Shifted<'_, R> {
 
     fn is_timed(&self) -> bool {
         self.system.is_timed()
+    }
+
+    fn mark_sums(&self, is_sum: &mut [bool]) {
+        self.system.mark_sums(is_sum);
     }
 }

@@ -6,6 +6,9 @@ use crate::one_step::Trial;
 /// Errors below the tolerated part of this are ignored, whatever the size of the component.
 pub(crate) const FLOOR: f64 = 1e-18;
 
+/// The part of a component that no rate reads to which the error of a step is relative, where it goes less far in the step.
+pub(crate) const OF_SUM: f64 = 1e-3;
+
 /// A step of so many resolutions of time, in which nothing changes by more than [`NOTHING`] times the tolerance, is an instant.
 const INSTANT: f64 = 1e4;
 const NOTHING: f64 = 1e-3;
@@ -38,6 +41,8 @@ pub struct Workspace {
     /// The least and the greatest values of the components at the stages of the step just tried, where these are kept.
     pub(crate) reached: [Vec<f64>; 2],
     pub(crate) reached_is_kept: bool,
+    /// The components that no rate reads ([`Rates::mark_sums`]).
+    pub(crate) is_sum: Vec<bool>,
     /// The error of each rate by rounding of the state; empty unless noise was measured.
     pub(crate) noise: Vec<f64>,
     /// The resolution of time at the start of the step if rates depend on time, otherwise 0.
@@ -107,6 +112,9 @@ impl Workspace {
     /// The first component whose rate is not finite.
     pub fn start(&mut self, system: &mut impl Rates, y: &[f64]) -> Result<(), usize> {
         self.stage[..y.len()].copy_from_slice(y);
+        self.is_sum.clear();
+        self.is_sum.resize(y.len(), false);
+        system.mark_sums(&mut self.is_sum);
         self.evaluate(system, 0.0, 0);
         self.rates_at_start().iter().position(|x| !x.is_finite()).map_or(Ok(()), Err)
     }

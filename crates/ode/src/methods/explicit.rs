@@ -11,7 +11,7 @@ use super::dop853::join_estimates;
 use crate::Rates;
 use crate::dense::Dense;
 use crate::one_step::{InteriorError, OneStep, Step, Trial};
-use crate::workspace::{FLOOR, MAX_STAGES, PART, Workspace, part};
+use crate::workspace::{FLOOR, MAX_STAGES, OF_SUM, PART, Workspace, part};
 use dlsys_expr::SimTime;
 use std::marker::PhantomData;
 
@@ -323,6 +323,10 @@ impl Workspace {
             for (noise, known) in noise.iter_mut().zip(self.noise.iter().skip(first)) {
                 *noise = *known;
             }
+            let mut size = from.map(f64::abs);
+            for (size, is_sum) in size.iter_mut().zip(self.is_sum.iter().skip(first)) {
+                *size *= if *is_sum { OF_SUM } else { 1.0 };
+            }
             for j in 0..PART {
                 // Relative to where the step begins, and to how far it goes from there at first: what
                 // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
@@ -332,7 +336,7 @@ impl Workspace {
                 // Rates that depend on time are known as well as time is.
                 let blur = blur * (second[j] - departure[j]).abs();
                 let blur = blur + 4.0 * h.abs() * noise[j];
-                let scale = tolerance * (from[j].abs().max(h.abs() * speed) + FLOOR) + blur;
+                let scale = tolerance * (size[j].max(h.abs() * speed) + FLOOR) + blur;
                 roundings[j] = 4.0 * f64::EPSILON * end[j].abs() / scale;
                 ratios[j] = estimate[j] / scale;
             }

@@ -152,6 +152,12 @@ impl Rates for Independent<'_> {
         1
     }
 
+    fn mark_sums(&self, is_sum: &mut [bool]) {
+        for (is_sum, variable) in is_sum.iter_mut().zip(&self.numeric) {
+            *is_sum = !self.solve.jacobian.entries.iter().any(|entry| entry.1 == *variable);
+        }
+    }
+
     fn is_timed(&self) -> bool {
         self.program.reads().contains(&self.time)
     }
