@@ -169,7 +169,7 @@ fn twins_are_integrated_once_and_live_as_if_they_were_alone() {
     };
     let (one, work) = at_end("A(0.1, 1)");
     let (twins, work_of_twins) = at_end("A(0.1, 1) A(0.1, 1)");
-    assert!(twins.len() == 64 && twins.iter().all(|twin| *twin == one[0]), "{} {twins:?}", one[0].1[0]);
+    assert!(twins.len() == 16 && twins.iter().all(|twin| *twin == one[0]), "{} {twins:?}", one[0].1[0]);
     // What is not evaluated again where one module goes on alone is evaluated twice where many take turns.
     assert!(work_of_twins < 2 * work, "{work_of_twins} evaluations, {work} for one");
     let (mixed, _) = at_end("A(0.1, 1) B(0.5) A(0.1, 1) A(0.11, 1)");

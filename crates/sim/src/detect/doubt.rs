@@ -147,6 +147,12 @@ impl CrossingDetector {
         if noise <= tolerance {
             return Lookahead::crossing(next);
         }
+        // What begins on the boundary has no error there, and soon more than its distance: it does not come near, it comes from there.
+        if start == 0.0
+            && let Some(ahead) = self.leave_band(path, &mut query, start, noise)
+        {
+            return ahead;
+        }
         match self.approach(path, query, next, crossing, noise) {
             Some(ahead) => ahead,
             None => self.confirm(path, query, next, crossing, noise),

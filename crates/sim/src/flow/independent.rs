@@ -288,10 +288,12 @@ impl FlowStage<'_, '_> {
         let pulses = !solve.pulses.is_empty() && !fixed;
         integrator.keep_reached(pulses);
         let least = 64.0 * from.resolution();
+        // Where fields are read, they cut the steps.
+        let limit = self.world.resolved(from).filter(|_| solve.rates.stretch().is_finite());
+        integrator.expect_cuts(limit.is_some());
         let mut tries = 0;
         let step = loop {
             let stats = &mut self.log.stats;
-            let limit = self.world.resolved(from).filter(|_| solve.rates.stretch().is_finite());
             let request = StepRequest { settings: &settings, y: &y, start: from, limit };
             let step = integrator.step(request, control, &mut system, stats);
             let step = step.map(|_| integrator.dense(&mut system, &y));

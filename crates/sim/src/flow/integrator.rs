@@ -47,9 +47,9 @@ impl Integrator {
         self.stepper.restart(method, n);
     }
 
-    /// Prefers methods of low order: the limits of steps are nearer than step control would go.
-    pub fn expect_cuts(&mut self) {
-        self.stepper.is_cut = true;
+    /// Declares whether limits cut steps shorter than step control would make them, which methods of low order suit.
+    pub fn expect_cuts(&mut self, are_cut: bool) {
+        self.stepper.is_cut = are_cut;
     }
 
     /// Declares whether steps are free of searches for events. The dense output of such unwatched steps is refined for

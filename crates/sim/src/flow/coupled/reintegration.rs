@@ -89,7 +89,7 @@ impl Default for Reintegration {
     fn default() -> Reintegration {
         let mut integrator = Integrator::default();
         // The end of the common step limits them.
-        integrator.expect_cuts();
+        integrator.expect_cuts(true);
         let (control, numbers, system, memory) = Default::default();
         let (region, trial, stages, y) = Default::default();
         Reintegration {
