@@ -64,6 +64,14 @@ fn no_jump_of_a_whole_part_is_passed_over() {
     // A difference of a value and its whole part.
     let text = "initial string: A(0, 1.32)\nA(z, y): solve z = if 0.5*y - floor(0.5*y) < 0.3 then 1.18 else 0.66, dy/dt = 1.771*cos(t)";
     reaches(text, 3.0, "A", &[0.66, 1.32 + 1.771 * 3f64.sin()]);
+    // 1.19 y falls from 1.4518 by 0.98294 a unit of time: three times 0.3 of it are in the first part of a period.
+    for condition in ["1.19*y - floor(1.19*y) < 0.3", "!(0.3 <= 1.19*y - floor(1.19*y))"] {
+        let text = format!(
+            "initial string: A(0, 0, 1.22)\nA(x, z, y): solve dx/dt = z, z = if {condition} then 1.99 else -0.53, dy/dt = -0.826"
+        );
+        let end = [-0.53 * 3.0 + 2.52 * 0.9 / 0.98294, -0.53, 1.22 - 3.0 * 0.826];
+        reaches(&text, 3.0, "A", &end);
+    }
     // Several whole parts, in a value that is matched.
     let text = "initial string: A(0, 0.73)\nA(x, y): solve dx/dt = match ceil(3.46*y) - 1 case -1: 3 case 0: 1.49 case 1: 1.9 else 0.07, dy/dt = -1.938";
     let passes = |level: f64| (0.73 - level / 3.46) / 1.938;

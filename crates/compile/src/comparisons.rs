@@ -3,7 +3,8 @@
 //! `floor(x) = 2` changes where x passes 2 and 3, but the difference of its sides rests at whole numbers and jumps from one to the
 //! next: whether it has just jumped cannot be told from its value near the jump, where x may be rounded to either side. `2 <= x & x < 3`
 //! says the same, and changes where differences of smooth values cross zero. The same holds for `sign`, and for comparisons of
-//! `max(x, y)`, `min(x, y)` and `abs(x)` with an operand, which rest at equality.
+//! `max(x, y)`, `min(x, y)` and `abs(x)` with an operand, which rest at equality; and for the place within a period, `x - floor(x) < 0.3`: it is so where
+//! sin(π x) sin(π (x - 0.3)) is negative, and where x is whole.
 
 use dlsys_expr::{Binary, Graph, Node, NodeId, Unary};
 
@@ -24,7 +25,9 @@ pub fn plain(graph: &mut Graph, id: NodeId, is_steady: &dyn Fn(u32) -> bool) -> 
         }
         Binary::Lt | Binary::Le => {
             let is_strict = op == Binary::Lt;
-            below(graph, a, b, is_strict, is_steady).or_else(|| above(graph, a, b, is_strict, is_steady))
+            phase(graph, a, b, is_strict)
+                .or_else(|| below(graph, a, b, is_strict, is_steady))
+                .or_else(|| above(graph, a, b, is_strict, is_steady))
         }
         _ => None,
     }
@@ -54,6 +57,37 @@ fn shifted(graph: &mut Graph, sum: NodeId, level: NodeId) -> (NodeId, NodeId) {
 fn jumps(graph: &Graph, x: NodeId, level: NodeId, is_steady: &dyn Fn(u32) -> bool) -> bool {
     let rests = |id| graph.variables(&[id]).into_iter().all(is_steady);
     rests(level) && !rests(x)
+}
+
+/// `x - floor(x)` compared with a number between 0 and 1, on either side.
+fn phase(graph: &mut Graph, a: NodeId, b: NodeId, is_strict: bool) -> Option<NodeId> {
+    let whole_part = |graph: &Graph, id| match graph.node(id) {
+        Node::Binary(Binary::Sub, x, whole) if graph.node(whole) == Node::Unary(Unary::Floor, x) => Some(x),
+        _ => None,
+    };
+    let number = |graph: &Graph, id| graph.as_constant(id).filter(|level| 0.0 < *level && *level < 1.0);
+    let (x, level, is_below) = match (whole_part(graph, a), whole_part(graph, b)) {
+        (Some(x), None) if number(graph, b).is_some() => (x, b, true),
+        (None, Some(x)) if number(graph, a).is_some() => (x, a, false),
+        _ => return None,
+    };
+    let zero = graph.constant(0.0);
+    let beyond = graph.binary(Binary::Sub, x, level);
+    let [begins, ends] = [x, beyond].map(|x| graph.unary(Unary::SinPi, x));
+    let product = graph.binary(Binary::Mul, begins, ends);
+    let (lo, hi) = if is_below { (product, zero) } else { (zero, product) };
+    let inside = graph.binary(Binary::Lt, lo, hi);
+    // Which of the two ends counts: the whole number with what is below, the level where equality counts.
+    let ends: &[NodeId] = match (is_below, is_strict) {
+        (true, true) => &[begins],
+        (true, false) => &[begins, ends],
+        (false, true) => &[],
+        (false, false) => &[ends],
+    };
+    Some(ends.iter().fold(inside, |all, end| {
+        let there = graph.binary(Binary::Eq, *end, zero);
+        graph.binary(Binary::Or, all, there)
+    }))
 }
 
 /// `x < y`, or `x <= y`.
@@ -189,7 +223,8 @@ mod tests {
 
     #[test]
     fn plain_comparisons_hold_for_the_same_values() {
-        let numbers = [-2.5, -2.0, -1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.0, 2.5, f64::NAN];
+        let numbers =
+            [-2.5, -2.0, -1.75, -1.5, -1.0, -0.5, 0.0, 0.5, 0.75, 1.0, 1.5, 2.0, 2.25, 2.5, f64::NAN];
         let mut graph = Graph::default();
         let (x, y) = (graph.var(0), graph.var(1));
         let mut steps: Vec<NodeId> =
@@ -204,7 +239,9 @@ mod tests {
             }
             steps.push(graph.binary(Binary::Add, n, steps[0]));
         }
-        let mut levels: Vec<NodeId> = numbers[..11].iter().map(|number| graph.constant(*number)).collect();
+        let floor = steps[0];
+        steps.push(graph.binary(Binary::Sub, x, floor));
+        let mut levels: Vec<NodeId> = numbers[..14].iter().map(|number| graph.constant(*number)).collect();
         levels.extend([x, y]);
         let mut known = 0;
         for step in steps {

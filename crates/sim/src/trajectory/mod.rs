@@ -14,7 +14,7 @@ pub use driven::{AutonomousFlow, DrivenSolution, Pace};
 pub use function::FunctionOfTime;
 use growth::Growth;
 pub use riccati::Riccati;
-pub use sum::{TermSum, Terms};
+pub use sum::{Chain, TermSum, Terms};
 
 use dlsys_expr::{Dual, Interval, Value};
 

@@ -30,6 +30,15 @@ pub struct Terms {
     refused: bool,
 }
 
+/// Solutions each of which flows into the one before: `x_i' = d_i x_i + x_(i+1)`, and the last one has a constant inflow.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Chain {
+    /// For each, d and the value at some time.
+    pub links: SmallVec<[(f64, f64); 4]>,
+    /// The inflow of the last one.
+    pub inflow: f64,
+}
+
 /// The terms of a solution may be this many times larger at its start than its value there, or than 1. What they cancel is lost: the solution is right
 /// to 1e-12. `x' = -a x + t³` has terms of 6/a⁴.
 const CANCELLATION: f64 = 1e4;
@@ -212,9 +221,8 @@ impl Terms {
         Some(TermSum::new(out))
     }
 
-    /// The sum as the first of a chain of solutions, each of which flows into the one before: `x_i' = d_i x_i + x_(i+1)`. For each, d and
-    /// the value at a time; the last one has a constant inflow, which is the second result. None if a term oscillates, or there are too many.
-    pub fn chain(&self, tau: f64) -> Option<(SmallVec<[(f64, f64); 4]>, f64)> {
+    /// The sum as the first of a chain of solutions, with their values at a time. None if a term oscillates, or there are too many.
+    pub fn chain(&self, tau: f64) -> Option<Chain> {
         if self.refused || self.terms().iter().any(|t| t.frequency != 0.0) {
             return None;
         }
@@ -222,7 +230,7 @@ impl Terms {
         loop {
             let inflow = rest.as_constant();
             if let (Some(inflow), false) = (inflow, links.is_empty()) {
-                return Some((links, inflow));
+                return Some(Chain { links, inflow });
             }
             let varies = |t: &&Term| t.power > 0 || t.growth != 0.0;
             let d = rest.terms().iter().find(varies).map_or(0.0, |t| t.growth);

@@ -3,7 +3,7 @@
 use super::{Linear, Problem};
 use crate::flow::coupled::rows::{FormulaInput, VariableSource};
 use crate::flow::coupled::system::System;
-use crate::trajectory::Trajectory;
+use crate::trajectory::{Chain, Trajectory};
 use dlsys_expr::Scratch;
 use dlsys_model::Rule;
 use smallvec::smallvec;
@@ -28,12 +28,13 @@ impl Unknowns {
         }
         let formula = &formulas[i as usize];
         let x = formula.trajectory.at(formula.x, formula.offset);
-        let (mut links, inflow) = match &formula.trajectory {
-            Trajectory::Polynomial([c, 0.0, 0.0, 0.0]) => (smallvec![(0.0, x)], *c),
+        let Chain { mut links, inflow } = match &formula.trajectory {
+            Trajectory::Polynomial([c, 0.0, 0.0, 0.0]) => Chain { links: smallvec![(0.0, x)], inflow: *c },
             Trajectory::Riccati(law) => {
                 let decay = law.exponential()?.1;
                 // x' = rate + decay (x - x(start))
-                (smallvec![(decay, x)], formula.trajectory.rate(formula.offset) - decay * x)
+                let inflow = formula.trajectory.rate(formula.offset) - decay * x;
+                Chain { links: smallvec![(decay, x)], inflow }
             }
             other => other.terms(formula.x)?.chain(formula.offset)?,
         };
