@@ -6,8 +6,11 @@ use crate::one_step::Trial;
 /// Errors below the tolerated part of this are ignored, whatever the size of the component.
 pub(crate) const FLOOR: f64 = 1e-18;
 
-/// The part of a component that no rate reads to which the error of a step is relative, where it goes less far in the step.
-pub(crate) const OF_SUM: f64 = 1e-3;
+/// The part of a component that no rate reads to which the error of a step is relative, where it goes less far in the step; more where
+/// rounding is in the way.
+pub(crate) fn part_of_sum(tolerance: f64) -> f64 {
+    (1e-13 / tolerance).clamp(1e-3, 1.0)
+}
 
 /// A step of so many resolutions of time, in which nothing changes by more than [`NOTHING`] times the tolerance, is an instant.
 const INSTANT: f64 = 1e4;

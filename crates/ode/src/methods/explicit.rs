@@ -11,7 +11,7 @@ use super::dop853::join_estimates;
 use crate::Rates;
 use crate::dense::Dense;
 use crate::one_step::{InteriorError, OneStep, Step, Trial};
-use crate::workspace::{FLOOR, MAX_STAGES, OF_SUM, PART, Workspace, part};
+use crate::workspace::{FLOOR, MAX_STAGES, PART, Workspace, part, part_of_sum};
 use dlsys_expr::SimTime;
 use std::marker::PhantomData;
 
@@ -325,7 +325,7 @@ impl Workspace {
             }
             let mut size = from.map(f64::abs);
             for (size, is_sum) in size.iter_mut().zip(self.is_sum.iter().skip(first)) {
-                *size *= if *is_sum { OF_SUM } else { 1.0 };
+                *size *= if *is_sum { part_of_sum(tolerance) } else { 1.0 };
             }
             for j in 0..PART {
                 // Relative to where the step begins, and to how far it goes from there at first: what

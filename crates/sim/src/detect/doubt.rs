@@ -148,7 +148,7 @@ impl CrossingDetector {
             return Lookahead::crossing(next);
         }
         // What begins on the boundary has no error there, and soon more than its distance: it does not come near, it comes from there.
-        if start == 0.0
+        if start.abs() <= tolerance
             && let Some(ahead) = self.leave_band(path, &mut query, start, noise)
         {
             return ahead;
