@@ -174,7 +174,7 @@ fn below(
     }
 }
 
-/// `level < step`, or `level <= step`.
+/// `level < step`, or `level <= step`: what is not so where `step <= level`, or `step < level`, but for NaN.
 fn above(
     graph: &mut Graph,
     level: NodeId,
@@ -182,31 +182,9 @@ fn above(
     is_strict: bool,
     is_steady: &dyn Fn(u32) -> bool,
 ) -> Option<NodeId> {
-    match graph.node(step) {
-        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if jumps(graph, x, level, is_steady) => {
-            // l < floor(x): floor(l) + 1 <= x. l <= floor(x): ceil(l) <= x. l < ceil(x): floor(l) < x. l <= ceil(x): ceil(l) - 1 < x.
-            let is_floor = op == Unary::Floor;
-            let part = if is_strict { Unary::Floor } else { Unary::Ceil };
-            let shift = f64::from(u8::from(is_strict)) - f64::from(u8::from(!is_floor));
-            let end = whole(graph, part, level, shift);
-            Some(ordered(graph, !is_floor, end, x))
-        }
-        Node::Unary(Unary::Sign, x) => {
-            let (level, zero) = (graph.as_constant(level)?, graph.constant(0.0));
-            let holds = |sign: f64| if is_strict { level < sign } else { level <= sign };
-            match [-1.0, 0.0, 1.0].map(holds) {
-                [false, false, true] => Some(ordered(graph, true, zero, x)),
-                [false, true, true] => Some(ordered(graph, false, zero, x)),
-                _ => None,
-            }
-        }
-        // y < max(x, y), and y <= min(x, y).
-        Node::Binary(op @ (Binary::Min | Binary::Max), x, y)
-            if (x == level || y == level) && is_strict == (op == Binary::Max) =>
-        {
-            let other = if x == level { y } else { x };
-            Some(ordered(graph, is_strict, level, other))
-        }
+    let opposite = below(graph, step, level, !is_strict, is_steady)?;
+    match graph.node(opposite) {
+        Node::Binary(op @ (Binary::Lt | Binary::Le), x, y) => Some(ordered(graph, op == Binary::Le, y, x)),
         _ => None,
     }
 }

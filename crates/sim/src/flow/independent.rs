@@ -40,6 +40,16 @@ pub struct Hint {
     hurdle: Option<Hurdle>,
 }
 
+/// What a module knows when it makes a step.
+#[derive(Clone, Copy)]
+pub struct Experience {
+    pub control: Control,
+    /// The number of steps under the clause before this one.
+    number: u32,
+    /// The hurdle that is known.
+    hurdle: Option<Hurdle>,
+}
+
 /// The equations of one module that is integrated alone.
 struct Independent<'a> {
     solve: &'a Solve,
@@ -178,8 +188,8 @@ fn overlooked(detector: &mut Detector, step: &ExaminedStep, rule: usize, is_last
 }
 
 impl FlowStage<'_, '_> {
-    /// The experience with which a module makes its next step; its number under the clause, and the hurdle that is known.
-    pub fn experience(&self, id: ModuleId) -> (Control, u32, Option<Hurdle>) {
+    /// The experience with which a module makes its next step.
+    pub fn experience(&self, id: ModuleId) -> Experience {
         let state = self.world.state(id).expect("a module with a rule");
         let solve = state.solve.expect("has equations");
         let hint = self.flows.hints[self.world.tree.kind(id).index()][solve];
@@ -194,16 +204,21 @@ impl FlowStage<'_, '_> {
         }
         // The experience of other modules tells nothing about the error of this one's values.
         control.error = last.map_or(0.0, |s| s.control.error);
-        (control, number, hurdle)
+        Experience { control, number, hurdle }
     }
 
-    /// Makes a step of a module from its values in the tree; returns its length.
+    /// Makes a step of a module from its values in the tree, with this experience; returns its length.
     ///
     /// # Errors
     /// If no step can be made, or steps hardly advance time.
-    pub fn step_independent(&mut self, id: ModuleId, from: SimTime) -> Result<f64, Error> {
+    pub fn step_independent(
+        &mut self,
+        id: ModuleId,
+        from: SimTime,
+        experience: Experience,
+    ) -> Result<f64, Error> {
         let solve = self.world.state(id).and_then(|state| state.solve).expect("has equations");
-        let (mut control, number, mut hurdle) = self.experience(id);
+        let Experience { mut control, number, mut hurdle } = experience;
         let rejected = self.log.stats.rejected;
         let dense = self.make_own_step(id, from, &mut control).map_err(|error| {
             let own = |component: usize| {

@@ -29,13 +29,13 @@ use crate::setup::Setup;
 use crate::trajectory::Trajectory;
 use crate::world::neighbours::Neighbours;
 use crate::world::path::Path;
-use crate::world::state::{Change, Control, Next, NextKind};
+use crate::world::state::{Change, Next, NextKind};
 use crate::world::{Instant, World};
 use coupled::Coupled;
 use dlsys_model::{Model, Sign};
 use dlsys_ode::Dense;
 use dlsys_tree::{ModuleId, SimTime};
-use independent::Hint;
+use independent::{Experience, Hint};
 use integrator::Integrator;
 use known_rates::KnownRates;
 use smallvec::SmallVec;
@@ -201,12 +201,12 @@ impl FlowStage<'_, '_> {
         let numeric = state.is_numeric() && !state.coupled;
         state.next = state.next.again();
         let searched = !numeric && needs_search(state, rule);
-        let control = if numeric { self.experience(id).0 } else { Control::default() };
-        if numeric && self.follow_twin(id, from, &control) {
+        let experience = numeric.then(|| self.experience(id));
+        if experience.is_some_and(|own| self.follow_twin(id, from, &own.control)) {
             return Ok(());
         }
-        let (h, limit) = if numeric {
-            match self.step_independent(id, from) {
+        let (h, limit) = if let Some(experience) = experience {
+            match self.step_independent(id, from, experience) {
                 Ok(h) => (h, 1.0),
                 Err(error) => return self.arrest(id, from).ok_or(error),
             }
@@ -252,7 +252,7 @@ impl FlowStage<'_, '_> {
             self.schedule.schedule(who, at);
         }
         self.detector.note_approach(index.unwrap_or(0), near, before, at);
-        if numeric {
+        if let Some(Experience { control, .. }) = experience {
             self.flows.last_step = Some(LastStep { id, from, control, near: before, at });
         }
         Ok(())
