@@ -185,3 +185,41 @@ fn successors_get_the_level_at_which_their_condition_holds() {
         }
     }
 }
+
+/// The number of a whole part, and of its changes, of an x that moves from `start` at a rate until t = 2.
+fn counted(start: f64, rate: f64, whole: fn(f64) -> f64) -> [f64; 2] {
+    let (first, last) = (whole(start), whole(start + 2.0 * rate));
+    [last, (last - first).abs()]
+}
+
+#[test]
+fn a_production_that_holds_just_after_a_jump_finds_what_jumps_as_it_is_there() {
+    for (rate, drift) in [(-1.3, ""), (-1.3, " + 0*sin(x)"), (1.3, ""), (1.3, " + 0*sin(x)")] {
+        for (name, whole) in [("floor", f64::floor as fn(f64) -> f64), ("ceil", f64::ceil)] {
+            for start in [1.52, 0.77, -0.41] {
+                let expected = counted(start, rate, whole);
+                let first = whole(start);
+                let alone = format!(
+                    "initial string: A({start}, {first}, 0)\nA(x, n, k):\n  solve dx/dt = {rate}{drift}\n  if {name}(x) != n produce A(x, {name}(x), k + 1)"
+                );
+                let string = at(&alone, 2.0);
+                assert_eq!(string[0].1[1..], expected, "{alone}");
+                let around = format!(
+                    "initial string: X({start}) A({first}, 0)\nX(x): solve dx/dt = {rate}{drift}\nX(x) < A(n, k): if {name}(x) != n produce A({name}(x), k + 1)"
+                );
+                let string = at(&around, 2.0);
+                assert_eq!(string[1].1, expected, "{around}");
+            }
+        }
+    }
+    // Also with what is made once for each whole number, and from a condition that says the same in other words.
+    let text = "initial string: A(2.5)\nA(x):\n  solve dx/dt = -1\n  if x < 2 produce B(floor(x), x) for i in 1 .. floor(x): ( C(i) )";
+    let string = at(text, 1.0);
+    assert_eq!(
+        string.iter().map(|m| (m.0.as_str(), m.1.clone())).collect::<Vec<_>>(),
+        [("B", vec![1.0, 2.0]), ("C", vec![1.0])]
+    );
+    // A reader of the counter and of what it counts sees both on the same side.
+    let text = "initial string: A(2.5, 2) L(0)\nA(x, n):\n  solve dx/dt = -1 + 0*sin(x)\n  if floor(x) != n produce A(x, floor(x))\nA(x, n) < L(c): if floor(x) > n produce L(c + 1)";
+    assert_eq!(at(text, 2.0)[1].1, [0.0]);
+}

@@ -125,6 +125,7 @@ impl RuleBuilder<'_> {
             sides: atoms.sides,
             atoms: atoms.spans,
             boundaries: atoms.boundaries,
+            jumping: atoms.jumping,
             solves,
             produces: productions.produces,
             hidden: self.hidden(&rule.predecessor),

@@ -32,6 +32,8 @@ pub struct Atoms {
     pub sides: Vec<(NodeId, NodeId)>,
     pub spans: Vec<Span>,
     pub boundaries: Vec<Boundary>,
+    /// True for a part of a comparison of a whole part or a sign.
+    pub jumping: Vec<bool>,
     /// The module's parameters that no clause of the rule moves.
     steady: Vec<u32>,
     index: HashMap<(NodeId, NodeId), u32>,
@@ -41,11 +43,12 @@ impl RuleBuilder<'_> {
     /// Decomposes a condition into comparisons of two sides.
     pub(super) fn decompose(&mut self, root: NodeId, span: Span, atoms: &mut Atoms) -> Option<Condition> {
         enum Task {
-            Visit(NodeId),
+            /// A condition, and whether it is a part of a comparison of something that jumps.
+            Visit(NodeId, bool),
             Emit(ConditionStep),
         }
         let mut steps = Vec::new();
-        let mut tasks = vec![Task::Visit(root)];
+        let mut tasks = vec![Task::Visit(root, false)];
         while let Some(task) = tasks.pop() {
             if steps.len() > MAX_CONDITION {
                 self.error(
@@ -55,23 +58,25 @@ impl RuleBuilder<'_> {
                 );
                 return None;
             }
-            let id = match task {
+            let (id, jumps) = match task {
                 Task::Emit(step) => {
                     steps.push(step);
                     continue;
                 }
-                Task::Visit(id) => id,
+                Task::Visit(id, jumps) => (id, jumps),
             };
             match self.scope.graph.node(id) {
                 Node::Const(bits) => steps.push(ConditionStep::Constant(f64::from_bits(bits) != 0.0)),
-                Node::Unary(Unary::Not, a) => tasks.extend([Task::Emit(ConditionStep::Not), Task::Visit(a)]),
+                Node::Unary(Unary::Not, a) => {
+                    tasks.extend([Task::Emit(ConditionStep::Not), Task::Visit(a, jumps)]);
+                }
                 Node::Binary(op @ (Binary::And | Binary::Or), a, b) => {
                     let step = if op == Binary::And { ConditionStep::And } else { ConditionStep::Or };
-                    tasks.extend([Task::Emit(step), Task::Visit(b), Task::Visit(a)]);
+                    tasks.extend([Task::Emit(step), Task::Visit(b, jumps), Task::Visit(a, jumps)]);
                 }
                 Node::Binary(op, a, b) => {
                     if let Some(plain) = self.plain(id, span, &atoms.steady) {
-                        tasks.push(Task::Visit(plain));
+                        tasks.push(Task::Visit(plain, jumps || self.has_steps(id)));
                         continue;
                     }
                     let comparison = match op {
@@ -92,12 +97,20 @@ impl RuleBuilder<'_> {
                                 .help(advice::not_finite(f64::NAN)),
                         );
                     }
-                    steps.push(atoms.step(a, b, comparison, at, boundary));
+                    steps.push(atoms.step((a, b), comparison, jumps, at, boundary));
                 }
                 node => unreachable!("{node:?} is no condition"),
             }
         }
         Some(Condition(steps))
+    }
+
+    /// True if a whole part or a sign is a part of an expression.
+    fn has_steps(&self, id: NodeId) -> bool {
+        let graph = &self.scope.graph;
+        let is_step =
+            |part| matches!(graph.node(part), Node::Unary(Unary::Floor | Unary::Ceil | Unary::Sign, _));
+        graph.reachable(&[id]).into_iter().any(is_step)
     }
 
     /// A comparison in terms of what moves, if there is one; where it is written, and as what, holds for all of its parts.
@@ -128,9 +141,9 @@ impl Atoms {
     /// The step that compares two sides; each pair is stored once, in either order.
     fn step(
         &mut self,
-        a: NodeId,
-        b: NodeId,
+        (a, b): (NodeId, NodeId),
         comparison: Comparison,
+        jumps: bool,
         span: Span,
         sides: Option<&Sides>,
     ) -> ConditionStep {
@@ -142,8 +155,10 @@ impl Atoms {
                 Boundary::new(left, right, *turned != (a > b))
             });
             self.boundaries.push(known.unwrap_or_default());
+            self.jumping.push(false);
             self.sides.len() as u32 - 1
         });
+        self.jumping[atom as usize] |= jumps;
         ConditionStep::Atom(atom, comparison)
     }
 }

@@ -39,6 +39,8 @@ pub struct DeclaredRule {
     /// The place of each atom in the text.
     pub atoms: Vec<Span>,
     pub boundaries: Vec<Boundary>,
+    /// By atom: true if it is a part of a comparison of a whole part or a sign.
+    pub jumping: Vec<bool>,
     pub solves: Vec<DeclaredSolve>,
     pub produces: Vec<Produce>,
     /// Number of hidden parameters of the strict predecessor.

@@ -51,6 +51,8 @@ pub struct Rule {
     pub atoms: Vec<Span>,
     /// The boundary of each atom, as in `x = s`, for messages.
     pub boundaries: Vec<Boundary>,
+    /// By atom: true if it is a part of a comparison of a whole part or a sign, which jumps where the sides of the atom meet.
+    pub jumping: Vec<bool>,
     /// The `solve` clauses in the order written; the first whose condition holds is active.
     pub solves: Vec<Solve>,
     /// The `produce` clauses in the order written; of those whose conditions hold at one instant, the first applies.

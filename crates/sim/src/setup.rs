@@ -1,7 +1,7 @@
 //! The facts of a run that do not change: the model, the settings, and their consequences.
 
 use super::{Method, Settings};
-use dlsys_model::{CUT, KindId, Model, Rule, ZeroCrossing};
+use dlsys_model::{CUT, KindId, Model, Produce, Rule, ZeroCrossing};
 use dlsys_tree::Seed;
 
 /// The facts of a run. Every stage reads them, none writes them.
@@ -24,8 +24,10 @@ pub struct Setup<'m> {
     pub kinds_with_context: Vec<bool>,
     /// By rule: some successor of it reads parameters of the context.
     pub successors_read_context: Vec<bool>,
-    /// By rule: a variable that meets a level decides over something that jumps in a successor.
+    /// By rule: see [`levels_decide`].
     pub levels_decide: Vec<bool>,
+    /// By rule and production: something jumps in its condition or its successors.
+    pub jumps: Vec<Vec<bool>>,
     /// Neighbours are remembered.
     pub hands_on: bool,
     /// Some rule has an aggregate.
@@ -70,6 +72,7 @@ impl<'m> Setup<'m> {
             kinds_with_context,
             successors_read_context: successors_read_context.collect(),
             levels_decide: model.rules.iter().map(levels_decide).collect(),
+            jumps: model.rules.iter().map(jumps).collect(),
             hands_on,
             gathers,
             plain: !hands_on && !gathers && !is_algebraic && !is_discrete && !settings.transitions,
@@ -86,7 +89,8 @@ impl<'m> Setup<'m> {
     }
 }
 
-/// True if a variable that meets a level, at which conditions of a rule change, decides over something that jumps in one of its successors.
+/// True if a production asks for a whole part or a sign, or if a variable that meets a level, at which conditions of the rule change, decides
+/// over something that jumps in a successor. Then an event is more than the meeting of two sides.
 pub fn levels_decide(rule: &Rule) -> bool {
     let crossings =
         rule.solves.iter().map(|solve| &solve.zero_crossings).chain([&rule.zero_crossings_at_rest]);
@@ -97,6 +101,19 @@ pub fn levels_decide(rule: &Rule) -> bool {
             _ => None,
         })
         .collect();
-    !meets.is_empty()
+    let asks = rule.produces.iter().any(|produce| asks_for_jumps(rule, produce));
+    asks || !meets.is_empty()
         && rule.produces.iter().any(|produce| produce.outcome.jump_reads().any(|v| meets.contains(&v)))
+}
+
+/// True if the condition of a production compares whole parts or signs.
+fn asks_for_jumps(rule: &Rule, produce: &Produce) -> bool {
+    produce.guard.atoms().any(|(atom, _)| rule.jumping[atom])
+}
+
+/// By production: something jumps in its condition or its successors.
+fn jumps(rule: &Rule) -> Vec<bool> {
+    let jumps =
+        |produce: &Produce| asks_for_jumps(rule, produce) || produce.outcome.jump_reads().next().is_some();
+    rule.produces.iter().map(jumps).collect()
 }

@@ -229,6 +229,7 @@ fn compile_rule(
         sides,
         atoms: declared.atoms,
         boundaries: declared.boundaries,
+        jumping: declared.jumping,
         solves: solves.map(|((solve, clause), pulses)| clause.compile(solve, pulses, &layout)).collect(),
         produces: declared.produces,
         hidden: declared.hidden,

@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use smallvec::SmallVec;
 
 use super::chance::{self, Undrawn};
+use super::matching::put_levels;
 use super::{EventStage, Firing};
 use crate::budget;
 use crate::error::{Error, Site};
@@ -133,7 +134,7 @@ impl EventStage<'_, '_> {
             };
             self.materialise(id);
             match at_birth {
-                Some((rule, produce)) => all.push(Firing { id, rule, produce }),
+                Some((rule, produce)) => all.push(Firing::at(id, rule, produce)),
                 None => all.extend(self.fire_predicted(slot as usize)),
             }
         }
@@ -206,11 +207,13 @@ impl EventStage<'_, '_> {
                 true => self.world.variables(rule, fire.id, around, now, variables),
                 false => self.world.variables_read((rule, &[]), fire.id, around, now, variables),
             }
+            put_levels(&self.events.met, (&self.world.tree, fire.id), around, variables);
             set_levels(self.world, fire, (rule, self.setup.levels_decide[fire.rule]), self.scratch);
             let lineage = self.world.tree.lineage(fire.id);
             let residual = if self.log.records() { self.residual(fire) } else { 0.0 };
             let made = match clause.is_fault {
                 true => Err(Refusal::NegativeRate),
+                false if fire.after => self.successor_after(fire, &mut new).map_err(Refusal::from),
                 false => chance::successor(self.setup.seed, clause, lineage, self.scratch, &mut new)
                     .map_err(Refusal::from),
             };

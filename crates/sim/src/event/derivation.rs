@@ -138,7 +138,7 @@ impl EventStage<'_, '_> {
                         first.push(id);
                     }
                     self.events.steps.contexts.push(context);
-                    found.push(Firing { id, rule, produce: 0 });
+                    found.push(Firing::at(id, rule, 0));
                     false
                 }
             }

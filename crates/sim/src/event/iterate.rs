@@ -3,7 +3,6 @@
 use super::{EventStage, Firing, lives};
 use crate::error::{Error, Site};
 use crate::scratch::clear;
-use dlsys_model::Truth;
 
 /// Most rounds of productions at one instant.
 pub const MAX_ROUNDS: usize = 10_000;
@@ -87,6 +86,8 @@ impl EventStage<'_, '_> {
             clear(&mut firing);
             self.events.firing = firing;
         }
+        self.events.met.clear();
+        self.events.is_after = false;
         self.neighbours.end_instant();
         self.finish_transitions();
         self.start_flows()?;
@@ -104,13 +105,11 @@ impl EventStage<'_, '_> {
         let world = &self.world;
         firing.extend(self.events.opened.iter().filter_map(|&id| {
             if let Some(class) = world.lives.get(world.tree.label_if_alive(id)?) {
-                return Some(Firing { id, rule: class.rule, produce: class.produce()? });
+                return Some(Firing::at(id, class.rule, class.produce()?));
             }
             let state = world.state(id)?;
             let (rule, open) = (state.rule?, state.open.as_ref()?);
-            let produces = &self.setup.model.rules[rule].produces;
-            let produce = produces.iter().position(|p| p.guard.judge(|i| open.at[i]) == Truth::Yes)?;
-            Some(Firing { id, rule, produce })
+            Some(Firing::at(id, rule, self.production_at(rule, &open.at)?))
         }));
         firing
     }
@@ -123,7 +122,7 @@ impl EventStage<'_, '_> {
             Some((rule, produce)) => {
                 let (rules, now) = (&self.setup.model.rules, self.instant.at);
                 lives::write_values_at_event(self.world, rules, first, now, self.scratch);
-                self.site(&Firing { id: first, rule, produce })
+                self.site(&Firing::at(first, rule, produce))
             }
             None => match firing.first() {
                 Some(fire) => self.site(fire),

@@ -87,7 +87,7 @@ impl EventStage<'_, '_> {
         if let Err(refusal) = possible {
             self.world.lives.keep(label, life);
             lives::write_values_at_event(self.world, &model.rules, id, self.instant.at, self.scratch);
-            let site = self.site(&Firing { id, rule, produce });
+            let site = self.site(&Firing::at(id, rule, produce));
             return Err(refusal.error(self.world, site));
         }
         if self.log.records() {

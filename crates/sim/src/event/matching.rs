@@ -8,7 +8,7 @@ use crate::detect::signs::{EQUAL, NEAR, noise, opposite};
 use crate::world::context::Context;
 use crate::world::state::Signs;
 use dlsys_model::{ContextPart, Pattern, Rule, Sign};
-use dlsys_tree::ModuleId;
+use dlsys_tree::{ModuleId, Tree};
 
 /// The place of the bracket that closes the first one.
 fn closing(shape: &[ContextPart]) -> usize {
@@ -22,6 +22,25 @@ fn closing(shape: &[ContextPart]) -> usize {
         }
     }
     shape.len()
+}
+
+/// Puts the levels that parameters of a module's context meet at this instant among the variables of its rule.
+pub fn put_levels(
+    met: &[(ModuleId, usize, f64)],
+    (tree, id): (&Tree, ModuleId),
+    around: &Context,
+    variables: &mut [f64],
+) {
+    if met.is_empty() {
+        return;
+    }
+    let mut first = tree.parameters(id).len();
+    for &module in around.context() {
+        for &(_, parameter, level) in met.iter().filter(|met| met.0 == module) {
+            variables[first + parameter] = level;
+        }
+        first += tree.parameters(module).len();
+    }
 }
 
 impl EventStage<'_, '_> {
@@ -146,6 +165,7 @@ impl EventStage<'_, '_> {
         }
         let read = (rule, &rule.watched[..]);
         self.world.variables_read(read, id, context, self.instant.at, &mut self.scratch.variables);
+        put_levels(&self.events.met, (&self.world.tree, id), context, &mut self.scratch.variables);
         let mut out: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
         rule.sides.eval(&self.scratch.variables, &mut self.scratch.registers, &mut out);
         let scale = self.world.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()));

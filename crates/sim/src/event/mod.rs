@@ -14,6 +14,7 @@
 //! examined again at the same instant, until nothing holds. Only the modules that the instant concerns are *open*; all
 //! others go on as they were.
 
+mod after;
 mod apply;
 pub mod chance;
 mod consistency;
@@ -54,6 +55,15 @@ pub struct Firing {
     pub id: ModuleId,
     pub rule: usize,
     pub produce: usize,
+    /// Something jumps in it, and it holds just after the instant but not at it: see [`after`].
+    pub after: bool,
+}
+
+impl Firing {
+    /// A production that holds at the instant.
+    pub fn at(id: ModuleId, rule: usize, produce: usize) -> Firing {
+        Firing { id, rule, produce, after: false }
+    }
 }
 
 /// The modules that an instant concerns, and the work that is left to do at it.
@@ -78,6 +88,14 @@ pub struct Events {
     resting: Vec<ModuleId>,
     /// Discrete rules.
     pub steps: Steps,
+    /// Equations chosen anew, so far.
+    choices: usize,
+    /// The choice of equations has come back to where it was: from now on it is of no account whether what a module reads has changed.
+    hasty: bool,
+    /// Parameters that meet levels at the instant, of modules that others look at: the module, the number of the parameter, the level.
+    met: Vec<(ModuleId, usize, f64)>,
+    /// What jumps at the instant has jumped: a production has been applied that holds just after it only.
+    is_after: bool,
     /// Productions that are known to apply.
     pub firing: Vec<Firing>,
     /// Slots of lazy modules whose event it is.

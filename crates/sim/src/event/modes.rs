@@ -3,6 +3,9 @@
 //! Which clause is active just after an instant depends on signs just after it, and those on the equations. The first
 //! choice follows what is known; a choice that leads out of its own domain is given up for the next.
 
+use std::collections::HashSet;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
 use smallvec::SmallVec;
 
 use super::SHORT_LIFE;
@@ -10,13 +13,19 @@ use super::opening::open;
 use super::{EventStage, Firing};
 use crate::detect::signs::NEAR;
 use crate::error::Error;
-use crate::world::state::{Signs, Switches};
+use crate::world::state::{Open, Signs, Switches};
 use dlsys_expr::Dual;
 use dlsys_model::{Condition, ConditionStep, Remedy, Rule, Sign, Truth, ZeroCrossing};
 use dlsys_tree::ModuleId;
 
-/// Most times that the equations at one instant are chosen anew before the choice is called chattering.
-const MAX_CHOICES: usize = 8;
+/// Most passes over the open modules in which their equations are chosen anew, beyond one for each of them.
+const MAX_PASSES: usize = 8;
+
+/// So far away what a module reads may have got other equations for its signs to be in question.
+const FAR_AWAY: usize = 4;
+
+/// So many times the conditions inside the equations of a module turn before it is tried on the boundary.
+const FLIPS: usize = 2;
 
 /// A rate of no more than this part of the value, over the length of a step, is rounding.
 const NOISE: f64 = 16.0 * f64::EPSILON;
@@ -34,11 +43,13 @@ struct NoMode {
 /// One pass over the open modules.
 #[derive(Default)]
 struct Pass {
-    /// Some module has got other equations.
-    changed: bool,
+    /// Some module has got other equations: the last one, with its signs just after the instant.
+    changed: Option<(ModuleId, Signs)>,
     missing: Option<NoMode>,
     /// Modules whose equations agree with their signs just after the instant, with these.
     settled: SmallVec<[(ModuleId, Signs); 4]>,
+    /// Productions that hold just after the instant, if all equations are as they are now.
+    follow: Vec<Firing>,
 }
 
 impl EventStage<'_, '_> {
@@ -59,31 +70,49 @@ impl EventStage<'_, '_> {
     ) -> Result<(), Error> {
         self.choose_first(opened);
         self.flows.known_rates.clear();
-        for choice in 0.. {
+        let mut seen = HashSet::new();
+        self.events.hasty = false;
+        for number in 0.. {
             let mut pass = Pass::default();
-            for &id in opened {
+            // Most modules that read others read them on one side: to and fro, so that those that are read come first once.
+            let mut forth = opened.iter();
+            let mut back = opened.iter().rev();
+            while let Some(&id) = if number % 2 == 0 { forth.next() } else { back.next() } {
                 if self.world.state(id).is_none_or(|s| s.rule.is_none()) {
                     continue;
                 }
                 let (signs, snapped) = self.signs_after(id);
                 // A value born within the resolution of time of zero is born on it.
                 *hurried |= snapped;
-                match self.production_at(id, &signs) {
-                    Some(fire) => firing.push(fire),
-                    None => self.reconsider(id, signs, &mut pass),
+                match self.production_of(id, &signs) {
+                    Some((fire, true)) => firing.push(fire),
+                    // What holds after the instant may follow from equations that this module, or another one, will not have.
+                    Some((fire, false)) if self.is_left_to(id, &signs) => pass.follow.push(fire),
+                    _ => self.reconsider(id, signs, &mut pass),
                 }
+            }
+            // A choice that comes again leads nowhere, if it comes again also with all choices counted.
+            let mut turns = pass.changed.is_some()
+                && (number > 2 * (MAX_PASSES + opened.len()) || !seen.insert(self.choice_of(opened)));
+            if turns && firing.is_empty() && !std::mem::replace(&mut self.events.hasty, true) {
+                seen.clear();
+                turns = false;
+            }
+            if pass.changed.is_none() || turns {
+                firing.append(&mut pass.follow);
             }
             if !firing.is_empty() {
                 return Ok(());
             }
-            if pass.missing.is_none() && pass.changed && choice > MAX_CHOICES {
-                let (id, signs) = pass.settled.pop().unwrap_or((opened[0], Signs::new()));
-                pass.missing = Some(NoMode { id, chattering: true, signs });
+            if let (None, true, Some((id, signs))) = (&pass.missing, turns, &pass.changed) {
+                pass.missing = Some(NoMode { id: *id, chattering: true, signs: signs.clone() });
             }
-            if let Some(missing) = pass.missing {
+            if let Some(missing) = pass.missing
+                && (pass.changed.is_none() || turns)
+            {
                 return Err(self.no_equations(&missing));
             }
-            if !pass.changed {
+            if pass.changed.is_none() {
                 for (id, signs) in pass.settled {
                     self.world.state_mut(id).expect("settled").signs = signs;
                 }
@@ -100,29 +129,47 @@ impl EventStage<'_, '_> {
             let Some(rule) = state.rule.map(|r| &self.setup.model.rules[r]) else { continue };
             let entry = open(state);
             entry.tried.clear();
-            entry.flips = 0;
+            (entry.flips, entry.chosen) = (0, 0);
             let guess = Signs::from_slice(&entry.guess);
             state.solve = next_clause(rule, &guess, &[]);
             state.switches = switches(rule, state.solve, &guess);
         }
     }
 
-    /// The production of an open module that holds at the instant or just after it.
-    fn production_at(&self, id: ModuleId, after: &[Sign]) -> Option<Firing> {
+    /// The production of an open module that holds at the instant, or else just after it; true if it holds at it.
+    fn production_of(&self, id: ModuleId, after: &[Sign]) -> Option<(Firing, bool)> {
         let state = self.world.state(id)?;
         let rule = state.rule?;
+        if let Some(produce) = self.production_at(rule, &state.open.as_ref()?.at) {
+            return Some((Firing::at(id, rule, produce), true));
+        }
         let produces = &self.setup.model.rules[rule].produces;
-        let holds = |signs: &[Sign]| produces.iter().position(|p| p.guard.judge(|i| signs[i]) == Truth::Yes);
-        let produce = holds(&state.open.as_ref()?.at).or_else(|| holds(after))?;
-        Some(Firing { id, rule, produce })
+        let produce = produces.iter().position(|p| p.guard.judge(|i| after[i]) == Truth::Yes)?;
+        Some((Firing { id, rule, produce, after: self.setup.jumps[rule][produce] }, false))
+    }
+
+    /// True if the equations of a module lead to signs under which they, or none, hold.
+    fn is_left_to(&self, id: ModuleId, signs: &[Sign]) -> bool {
+        let state = self.world.state(id).expect("open modules have a state");
+        let rule = &self.setup.model.rules[state.rule.expect("open modules have a rule")];
+        match rule.solves.iter().position(|solve| solve.guard.judge(|i| signs[i]) == Truth::Yes) {
+            None => true,
+            first => first == state.solve && switches(rule, first, signs) == state.switches,
+        }
     }
 
     /// Compares the equations of a module with the signs just after the instant that follow from them, and chooses again
     /// if they disagree.
     fn reconsider(&mut self, id: ModuleId, signs: Signs, pass: &mut Pass) {
+        let reads_anew = !self.events.hasty && self.reads_anew(id);
+        let choices = self.events.choices + 1;
         let state = self.world.state_mut(id).expect("open modules have a state");
         let rule = &self.setup.model.rules[state.rule.expect("open modules have a rule")];
         let entry = state.open.as_mut().expect("open");
+        if reads_anew {
+            entry.flips = 0;
+            entry.tried.clear();
+        }
         let first = rule.solves.iter().position(|s| s.guard.judge(|i| signs[i]) == Truth::Yes);
         if first != state.solve || (first.is_none() && !rule.solves.is_empty()) {
             entry.tried.extend(state.solve);
@@ -133,8 +180,10 @@ impl EventStage<'_, '_> {
                 Some(next) => {
                     state.solve = Some(next);
                     state.switches = switches(rule, state.solve, &signs);
+                    entry.chosen = choices;
+                    self.events.choices = choices;
                     self.flows.known_rates.forget(id);
-                    pass.changed = true;
+                    pass.changed = Some((id, signs));
                 }
                 None => {
                     let chattering = entry.tried.len() > 1;
@@ -146,26 +195,67 @@ impl EventStage<'_, '_> {
         let wanted = switches(rule, state.solve, &signs);
         if wanted != state.switches {
             entry.flips += 1;
-            let undecided = entry.flips > 2;
+            entry.chosen = choices;
+            self.events.choices = choices;
+            let undecided = entry.flips > FLIPS;
+            let at_rest = entry.flips == FLIPS + 1;
             let other = std::mem::replace(&mut state.switches, wanted);
             self.flows.known_rates.forget(id);
-            if undecided && self.is_smooth_across(id, &other) {
-                // It goes on alike on both sides: it rests on the boundary.
+            let smooth = undecided && self.is_smooth_across(id, &other);
+            if smooth || at_rest {
+                // It goes on alike on both sides, or there may be a rate between them that keeps it there: it rests on the boundary.
                 let state = self.world.state_mut(id).expect("seen above");
                 let at = &state.open.as_ref().expect("open").at;
                 let both = at.iter().zip(&signs);
                 let rest: Signs =
                     both.map(|(at, after)| if *at == Sign::Zero { Sign::Zero } else { *after }).collect();
                 state.switches = switches(rule, state.solve, &rest);
+                if !smooth {
+                    pass.changed = Some((id, signs));
+                }
                 pass.settled.push((id, rest));
                 return;
             }
             if undecided {
                 pass.missing.get_or_insert(NoMode { id, chattering: true, signs: signs.clone() });
             }
-            pass.changed = true;
+            pass.changed = Some((id, signs.clone()));
         }
         pass.settled.push((id, signs));
+    }
+
+    /// True if a module that this one reads has got other equations since this one got its own.
+    fn reads_anew(&self, id: ModuleId) -> bool {
+        let state = self.world.state(id).expect("open modules have a state");
+        let own = state.open.as_ref().map_or(0, |open| open.chosen);
+        let chosen = |module: &ModuleId| {
+            let open = self.world.state(*module).and_then(|state| state.open.as_ref());
+            open.is_some_and(|open| open.chosen > own)
+        };
+        state.context.iter().any(chosen)
+    }
+
+    /// What the equations of the open modules are, as one number.
+    fn choice_of(&self, opened: &[ModuleId]) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        for state in opened.iter().filter_map(|id| self.world.state(*id)) {
+            (state.solve, &state.switches).hash(&mut hasher);
+        }
+        hasher.finish()
+    }
+
+    /// True if a module, and those that it reads, go on with the equations that brought them here.
+    fn goes_on_alike(&self, id: ModuleId, depth: usize) -> bool {
+        let Some(state) = self.world.state(id) else { return true };
+        let is_other = |open: &Open| {
+            open.flow
+                .as_ref()
+                .is_none_or(|(solve, switches)| *solve != state.solve || *switches != state.switches)
+        };
+        if state.open.as_ref().is_some_and(|open| is_other(open)) {
+            return false;
+        }
+        depth == 0 || state.context.iter().all(|module| self.goes_on_alike(*module, depth - 1))
     }
 
     /// True if a module's rates are the same under other conditions inside its equations.
@@ -203,7 +293,6 @@ impl EventStage<'_, '_> {
         let mut entry = known.clone();
         let mut snapped = false;
         let mut after = entry.at.clone();
-        let smooth = entry.flow.as_ref().is_some_and(|f| f.0 == state.solve && f.1 == state.switches);
         let mut moving = Vec::new();
         self.flow().moving_variables(id, 0.0, &mut moving);
         let mut scratch = Vec::new();
@@ -229,7 +318,11 @@ impl EventStage<'_, '_> {
                 if slope.abs() * reach > least * size { Sign::of(slope) } else { Sign::Zero }
             };
             after[atom] = match (clear(slope, 1e-9), entry.guess[atom]) {
-                (Sign::Zero, guess @ (Sign::Plus | Sign::Minus)) if smooth => guess,
+                (Sign::Zero, guess @ (Sign::Plus | Sign::Minus))
+                    if !elsewhere && self.goes_on_alike(id, FAR_AWAY) =>
+                {
+                    guess
+                }
                 (Sign::Zero, _) => match clear(slope, NOISE) {
                     Sign::Zero => {
                         probed = true;

@@ -75,13 +75,28 @@ impl EventStage<'_, '_> {
         for change in touched {
             let Some((variable, value)) = change.level else { continue };
             let places = self.world.tree.places(id);
-            if variable < places.len() {
-                self.world.tree.set_value(places.start + variable, value);
+            match variable.checked_sub(places.len()) {
+                None => self.world.tree.set_value(places.start + variable, value),
+                Some(of_context) => self.note_level_of_neighbour(id, of_context, value),
             }
             if let Some(open) = self.world.state_mut(id).and_then(|state| state.open.as_mut()) {
                 let (atom, after) = (change.atom, change.after);
                 open.levels.push(Level { atom, variable, value, after });
             }
+        }
+    }
+
+    /// Notes that a parameter of the modules of a context, counted over all of them, is at a level at this instant: whoever reads it now reads
+    /// that, and not a rounding of it.
+    fn note_level_of_neighbour(&mut self, id: ModuleId, mut parameter: usize, level: f64) {
+        let Some(state) = self.world.state(id) else { return };
+        for &module in state.context.context() {
+            let own = self.world.tree.parameters(module).len();
+            if parameter < own {
+                self.events.met.push((module, parameter, level));
+                return;
+            }
+            parameter -= own;
         }
     }
 
@@ -204,7 +219,7 @@ impl EventStage<'_, '_> {
         let produce = produces.iter().position(|p| p.guard.judge(at) == Truth::Yes)?;
         let levels: SmallVec<[(usize, f64); 2]> = touched.iter().filter_map(|c| c.level).collect();
         self.world.rebase_except(id, self.instant.at, &levels);
-        Some(Firing { id, rule, produce })
+        Some(Firing::at(id, rule, produce))
     }
 }
 

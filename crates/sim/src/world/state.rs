@@ -197,8 +197,10 @@ pub struct Open {
     pub flow: Option<(Option<usize>, Switches)>,
     /// Clauses whose equations were tried.
     pub tried: SmallVec<[usize; 4]>,
-    /// Times that switches were found the other way.
+    /// Times that switches were found the other way, with what the module reads as it was.
     pub flips: usize,
+    /// The number of the last choice at the instant that gave it other equations; see [`modes`](crate::event).
+    pub chosen: usize,
     /// No side is near the other: signs are what they are.
     pub clear: bool,
     /// The variables that meet a level at the instant: what follows from that gets the level, not a rounding of it.

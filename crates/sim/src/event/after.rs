@@ -1,0 +1,114 @@
+//! Productions that hold just after an instant but not at it, where something jumps.
+//!
+//! `if floor(x) != n produce A(floor(x))`, with an x that falls through 2: at the instant the whole part is 2 and the condition does not
+//! hold; just after it the whole part is 1. So the successor is that of just after, A(1), and for the rest of the instant whole
+//! parts and signs in conditions are those of just after: else A(1) would find a whole part of 2 and be replaced without end.
+//! What does not jump has its value at the instant.
+
+use super::{EventStage, Firing, chance};
+use crate::world::new_modules::NewModules;
+use dlsys_expr::Dual;
+use dlsys_model::{Sign, Truth};
+use dlsys_tree::Family;
+
+/// The first delay that is tried, in resolutions of time.
+const FIRST_DELAY: f64 = 64.0;
+
+/// No delay is longer than this part of the present time, or of 1.
+const LONGEST_DELAY: f64 = 1e-6;
+
+/// Sides that differ by so much of their size differ by more than rounding, in whatever way the successor is written.
+const CLEAR: f64 = 1024.0 * f64::EPSILON;
+
+/// Arguments that differ by no more than this part of them are the same: what they differ by is the effect of the delay.
+const SAME: f64 = 1e-9;
+
+/// The limit from above of a number that is known a little later and twice as long later; the number at the instant itself, where it is
+/// known and no more than rounding away.
+fn just_after(at: Option<f64>, near: f64, far: f64) -> f64 {
+    let limit = if near == far { near } else { 2.0 * near - far };
+    at.filter(|at| (limit - at).abs() <= SAME * at.abs().max(limit.abs())).unwrap_or(limit)
+}
+
+impl EventStage<'_, '_> {
+    /// The production of a rule that holds, with these signs, at the instant. Once what jumps has jumped, no whole part and no sign there
+    /// tells anything.
+    pub fn production_at(&self, rule: usize, at: &[Sign]) -> Option<usize> {
+        let rule = &self.setup.model.rules[rule];
+        let has_jumped = |atom: usize| self.events.is_after && at[atom] == Sign::Zero && rule.jumping[atom];
+        let sign = |atom: usize| if has_jumped(atom) { Sign::Any } else { at[atom] };
+        rule.produces.iter().position(|produce| produce.guard.judge(sign) == Truth::Yes)
+    }
+
+    /// Appends the modules of the successor just after the instant to `out`; returns its number and the lineage of the new modules.
+    /// The variables in `self.scratch` are those of the instant.
+    pub fn successor_after(
+        &mut self,
+        fire: &Firing,
+        out: &mut NewModules,
+    ) -> Result<(usize, Family), chance::Undrawn> {
+        self.events.is_after = true;
+        let clause = &self.setup.model.rules[fire.rule].produces[fire.produce];
+        let lineage = self.world.tree.lineage(fire.id);
+        let variables = self.scratch.variables.clone();
+        let later = self.variables_after(fire);
+        let mut of = |variables: &[f64]| {
+            let mut made = NewModules::default();
+            self.scratch.variables.clear();
+            self.scratch.variables.extend_from_slice(variables);
+            let which = chance::successor(self.setup.seed, clause, lineage, self.scratch, &mut made);
+            which.map(|which| (which, made))
+        };
+        let [at, near, far] = [of(&variables), of(&later[0]), of(&later[1])];
+        // Where it has no successor a little later, it has none that could be told from that at the instant.
+        let ((which, family), mut made) = match (near, &at) {
+            (Ok(near), _) => near,
+            (Err(_), Ok(_)) => at.clone()?,
+            (Err(undrawn), Err(_)) => return Err(undrawn),
+        };
+        let alike = |other: Result<((usize, Family), NewModules), chance::Undrawn>| {
+            other.ok().filter(|((other, _), new)| *other == which && new.kinds == made.kinds)
+        };
+        if let Some((_, far)) = alike(far) {
+            let at = alike(at).map(|(_, at)| at.arguments);
+            for (i, near) in made.arguments.iter_mut().enumerate() {
+                *near = just_after(at.as_ref().map(|at| at[i]), *near, far.arguments[i]);
+            }
+        }
+        out.kinds.append(&mut made.kinds);
+        out.arguments.append(&mut made.arguments);
+        Ok((which, family))
+    }
+
+    /// The variables of a production a little after the instant, and twice as long after it: so long that the sides that meet at the
+    /// instant have parted again.
+    fn variables_after(&mut self, fire: &Firing) -> [Vec<f64>; 2] {
+        let rule = &self.setup.model.rules[fire.rule];
+        let open = self.world.state(fire.id).and_then(|state| state.open.as_ref());
+        let zero: Vec<usize> = match open {
+            Some(open) => (0..rule.atoms.len()).filter(|atom| open.at[*atom] == Sign::Zero).collect(),
+            None => Vec::new(),
+        };
+        self.flows.known_rates.clear();
+        let longest = LONGEST_DELAY * self.instant.at.to_f64().abs().max(1.0);
+        let mut delay = (FIRST_DELAY * self.instant.at.resolution()).min(longest);
+        let (mut moving, mut registers) = (Vec::new(), Vec::new());
+        let mut sides = vec![Dual { value: 0.0, rate: 0.0 }; rule.sides.outputs()];
+        loop {
+            self.flow().moving_variables(fire.id, delay, &mut moving);
+            rule.sides.eval(&moving, &mut registers, &mut sides);
+            let has_parted = |atom: &usize| {
+                let [a, b] = [sides[2 * atom], sides[2 * atom + 1]];
+                (a.value - b.value).abs() > CLEAR * a.value.abs().max(b.value.abs()) || a.rate == b.rate
+            };
+            if zero.iter().all(has_parted) || delay >= longest {
+                break;
+            }
+            delay = (4.0 * delay).min(longest);
+        }
+        [1.0, 2.0].map(|times| {
+            self.flow().moving_variables(fire.id, times * delay, &mut moving);
+            moving.iter().map(|variable| variable.value).collect()
+        })
+    }
+}
