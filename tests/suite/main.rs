@@ -53,6 +53,7 @@ mod report;
 mod scenes;
 mod schedulers;
 mod semantics;
+mod settled;
 mod shadows;
 mod sheets;
 mod signals;

@@ -70,7 +70,7 @@ impl EventStage<'_, '_> {
     ) -> Result<(), Error> {
         self.choose_first(opened);
         self.flows.known_rates.clear();
-        let mut seen = HashSet::new();
+        let (mut seen, mut settled_before) = (HashSet::new(), 0);
         self.events.hasty = false;
         for number in 0.. {
             let mut pass = Pass::default();
@@ -97,6 +97,11 @@ impl EventStage<'_, '_> {
             if turns && firing.is_empty() && !std::mem::replace(&mut self.events.hasty, true) {
                 seen.clear();
                 turns = false;
+                settled_before = self.events.choices;
+            }
+            if turns {
+                // What depends on a choice that comes and goes does not follow.
+                pass.follow.retain(|fire| !self.reads_chosen_after(settled_before, fire.id, FAR_AWAY));
             }
             if pass.changed.is_none() || turns {
                 firing.append(&mut pass.follow);
@@ -235,6 +240,13 @@ impl EventStage<'_, '_> {
         state.context.iter().any(chosen)
     }
 
+    /// True if a module, or what it reads, has got other equations after so many choices.
+    fn reads_chosen_after(&self, choices: usize, id: ModuleId, depth: usize) -> bool {
+        let Some(state) = self.world.state(id) else { return false };
+        state.open.as_ref().is_some_and(|open| open.chosen > choices)
+            || depth > 0 && state.context.iter().any(|id| self.reads_chosen_after(choices, *id, depth - 1))
+    }
+
     /// What the equations of the open modules are, as one number.
     fn choice_of(&self, opened: &[ModuleId]) -> u64 {
         let mut hasher = DefaultHasher::new();
@@ -246,13 +258,19 @@ impl EventStage<'_, '_> {
 
     /// True if a module, and those that it reads, go on with the equations that brought them here.
     fn goes_on_alike(&self, id: ModuleId, depth: usize) -> bool {
-        let Some(state) = self.world.state(id) else { return true };
+        let is_new = || self.instant.at.since(self.world.tree.birth(id)) <= 0.0;
+        let Some(state) = self.world.state(id) else { return !is_new() };
         let is_other = |open: &Open| {
             open.flow
                 .as_ref()
                 .is_none_or(|(solve, switches)| *solve != state.solve || *switches != state.switches)
         };
-        if state.open.as_ref().is_some_and(|open| is_other(open)) {
+        let begins_anew = match &state.open {
+            Some(open) => is_other(open),
+            // It has lost its equations at this instant.
+            None => state.restarted == self.instant.number,
+        };
+        if begins_anew {
             return false;
         }
         depth == 0 || state.context.iter().all(|module| self.goes_on_alike(*module, depth - 1))
