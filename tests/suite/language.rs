@@ -54,6 +54,19 @@ fn operators_bind_as_the_language_says() {
 }
 
 #[test]
+fn the_colon_of_a_case_does_not_begin_a_rule_on_a_line_that_goes_on() {
+    for rule in [
+        "def f(u) = (match floor(u +\n  1) case 0: 1 else 2)\nA(x): solve dx/dt = f(x)",
+        "A(x): solve dx/dt = 1 +\n  match floor(x) case 0: 1 case 1: 3 else 2",
+        "A(x): solve dx/dt = max(1,\n  match floor(x) case 0: 1 else 2)",
+        "A(x): solve dx/dt = match floor(x) case 0: 1 case 1:\n  2 case 2: 3 else 4\nB(x): solve dx/dt = 1",
+    ] {
+        let text = format!("initial string: A(0.5)\n{rule}");
+        assert_eq!(errors(&text), Vec::<String>::new(), "{text}");
+    }
+}
+
+#[test]
 fn a_line_break_ends_an_expression() {
     let text = "initial string: F(1) +(2)\nF(x): solve dx/dt = x\n+(α): solve dα/dt = 1";
     let model = crate::common::session(text).model;

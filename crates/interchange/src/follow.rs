@@ -24,8 +24,8 @@ const CHUNK: usize = 64;
 const AT_ONCE: usize = 20_000_000;
 /// Frames from one sample to the next, where the motion does not need more.
 const STRIDE: usize = 4;
-/// Intervals of less than this part of the way from frame to frame are not tested.
-const TESTED: f64 = 1.0;
+/// Intervals of less than this part of the way from frame to frame, or of the longest way, are not tested.
+const TESTED: f64 = 0.25;
 /// Where an interval is tested, in parts of it.
 const ASIDE: f64 = 0.4;
 /// Strings that are drawn together, at most.
@@ -122,7 +122,8 @@ impl Follower<'_, '_> {
 
     /// The samples from the last one before some frames up to them.
     fn knots(&mut self, start: Sample, frames: &[f64], mut times: Vec<f64>) -> Result<Vec<Sample>, Error> {
-        let long = TESTED * (frames[frames.len() - 1] - start.time) / frames.len() as f64;
+        let to_frame = (frames[frames.len() - 1] - start.time) / frames.len() as f64;
+        let long = TESTED * to_frame.min(self.closeness.longest);
         let mut knots = BTreeMap::from([(
             key(start.time),
             Knot { sample: start, depth: 0, done: true, strict: false, passed: 0 },

@@ -90,8 +90,6 @@ pub struct Events {
     pub steps: Steps,
     /// Equations chosen anew, so far.
     choices: usize,
-    /// The choice of equations has come back to where it was: from now on it is of no account whether what a module reads has changed.
-    hasty: bool,
     /// Parameters that meet levels at the instant, of modules that others look at: the module, the number of the parameter, the level.
     met: Vec<(ModuleId, usize, f64)>,
     /// What jumps at the instant has jumped: a production has been applied that holds just after it only.

@@ -52,6 +52,17 @@ struct Pass {
     follow: Vec<Firing>,
 }
 
+/// The search for equations that agree with where they lead.
+#[derive(Default)]
+struct Search {
+    /// What the equations were after each pass.
+    seen: HashSet<u64>,
+    /// They have come back to what they were: from now on a module's choices count also if what it reads has changed meanwhile.
+    hasty: bool,
+    /// Choices up to then.
+    choices: usize,
+}
+
 impl EventStage<'_, '_> {
     /// Chooses the equations of the open modules; finds productions whose conditions become true just after the
     /// instant.
@@ -70,38 +81,13 @@ impl EventStage<'_, '_> {
     ) -> Result<(), Error> {
         self.choose_first(opened);
         self.flows.known_rates.clear();
-        let (mut seen, mut settled_before) = (HashSet::new(), 0);
-        self.events.hasty = false;
+        let mut search = Search::default();
         for number in 0.. {
-            let mut pass = Pass::default();
-            // Most modules that read others read them on one side: to and fro, so that those that are read come first once.
-            let mut forth = opened.iter();
-            let mut back = opened.iter().rev();
-            while let Some(&id) = if number % 2 == 0 { forth.next() } else { back.next() } {
-                if self.world.state(id).is_none_or(|s| s.rule.is_none()) {
-                    continue;
-                }
-                let (signs, snapped) = self.signs_after(id);
-                // A value born within the resolution of time of zero is born on it.
-                *hurried |= snapped;
-                match self.production_of(id, &signs) {
-                    Some((fire, true)) => firing.push(fire),
-                    // What holds after the instant may follow from equations that this module, or another one, will not have.
-                    Some((fire, false)) if self.is_left_to(id, &signs) => pass.follow.push(fire),
-                    _ => self.reconsider(id, signs, &mut pass),
-                }
-            }
-            // A choice that comes again leads nowhere, if it comes again also with all choices counted.
-            let mut turns = pass.changed.is_some()
-                && (number > 2 * (MAX_PASSES + opened.len()) || !seen.insert(self.choice_of(opened)));
-            if turns && firing.is_empty() && !std::mem::replace(&mut self.events.hasty, true) {
-                seen.clear();
-                turns = false;
-                settled_before = self.events.choices;
-            }
+            let mut pass = self.pass(opened, (number, search.hasty), hurried, firing);
+            let turns = pass.changed.is_some() && self.turns(&mut search, number, opened);
             if turns {
                 // What depends on a choice that comes and goes does not follow.
-                pass.follow.retain(|fire| !self.reads_chosen_after(settled_before, fire.id, FAR_AWAY));
+                pass.follow.retain(|fire| !self.reads_chosen_after(search.choices, fire.id, FAR_AWAY));
             }
             if pass.changed.is_none() || turns {
                 firing.append(&mut pass.follow);
@@ -109,22 +95,61 @@ impl EventStage<'_, '_> {
             if !firing.is_empty() {
                 return Ok(());
             }
-            if let (None, true, Some((id, signs))) = (&pass.missing, turns, &pass.changed) {
-                pass.missing = Some(NoMode { id: *id, chattering: true, signs: signs.clone() });
+            if pass.changed.is_some() && !turns {
+                continue;
             }
-            if let Some(missing) = pass.missing
-                && (pass.changed.is_none() || turns)
-            {
+            let chatters = |(id, signs)| NoMode { id, chattering: true, signs };
+            if let Some(missing) = pass.missing.or_else(|| pass.changed.map(chatters)) {
                 return Err(self.no_equations(&missing));
             }
-            if pass.changed.is_none() {
-                for (id, signs) in pass.settled {
-                    self.world.state_mut(id).expect("settled").signs = signs;
-                }
-                return Ok(());
+            for (id, signs) in pass.settled {
+                self.world.state_mut(id).expect("settled").signs = signs;
             }
+            return Ok(());
         }
         Ok(())
+    }
+
+    /// One pass over the open modules, the equations of which are chosen anew where they do not agree with where they lead. Productions that
+    /// hold at the instant go into `firing`.
+    fn pass(
+        &mut self,
+        opened: &[ModuleId],
+        (number, hasty): (usize, bool),
+        hurried: &mut bool,
+        firing: &mut Vec<Firing>,
+    ) -> Pass {
+        let mut pass = Pass::default();
+        for i in 0..opened.len() {
+            // Most modules that read others read them on one side: to and fro, so that those that are read come first once.
+            let id = opened[if number % 2 == 0 { i } else { opened.len() - 1 - i }];
+            if self.world.state(id).is_none_or(|s| s.rule.is_none()) {
+                continue;
+            }
+            let (signs, snapped) = self.signs_after(id);
+            // A value born within the resolution of time of zero is born on it.
+            *hurried |= snapped;
+            match self.production_of(id, &signs) {
+                Some((fire, true)) => firing.push(fire),
+                // What holds after the instant may follow from equations that this module, or another one, will not have.
+                Some((fire, false)) if self.is_left_to(id, &signs) => pass.follow.push(fire),
+                _ => self.reconsider(id, signs, hasty, &mut pass),
+            }
+        }
+        pass
+    }
+
+    /// True if the choice of equations has come again, also with all choices counted: it leads nowhere.
+    fn turns(&self, search: &mut Search, number: usize, opened: &[ModuleId]) -> bool {
+        if search.seen.insert(self.choice_of(opened)) && number <= 2 * (MAX_PASSES + opened.len()) {
+            return false;
+        }
+        let again = std::mem::replace(&mut search.hasty, true);
+        if !again {
+            search.seen.clear();
+            search.choices = self.events.choices;
+        }
+        again
     }
 
     /// The first choice: the first clause that can hold where the signs are expected to go.
@@ -165,8 +190,8 @@ impl EventStage<'_, '_> {
 
     /// Compares the equations of a module with the signs just after the instant that follow from them, and chooses again
     /// if they disagree.
-    fn reconsider(&mut self, id: ModuleId, signs: Signs, pass: &mut Pass) {
-        let reads_anew = !self.events.hasty && self.reads_anew(id);
+    fn reconsider(&mut self, id: ModuleId, signs: Signs, hasty: bool, pass: &mut Pass) {
+        let reads_anew = !hasty && self.reads_anew(id);
         let choices = self.events.choices + 1;
         let state = self.world.state_mut(id).expect("open modules have a state");
         let rule = &self.setup.model.rules[state.rule.expect("open modules have a rule")];

@@ -6,16 +6,18 @@ use crate::lexeme::{Token, in_name};
 
 impl Scanner<'_> {
     /// True if a `:` stands on the line outside parentheses opened on it, and before any `produce` or arrow (a colon behind
-    /// those ends a weight).
+    /// those ends a weight) and not behind a `case`, which a line may have that goes on with the expression of the line before.
     pub(super) fn has_colon(&self, tokens: &[(Token, usize, usize)]) -> bool {
-        let mut depth = 0i64;
+        let (mut depth, mut cases) = (0i64, 0usize);
         // A head has neither `for NAME in` nor `if`.
         let mut in_string = self.in_string || self.levels.len() > 1;
         for (i, &token) in tokens.iter().enumerate() {
             match token.0 {
                 Token::Open => depth += 1,
                 Token::Close => depth -= 1,
+                Token::Colon if cases > 0 => cases -= 1,
                 Token::Colon if depth <= 0 => return true,
+                Token::Word if self.word(token) == "case" => cases += 1,
                 Token::Word if in_string && self.begins_group(tokens, i) => return false,
                 Token::Word if self.word(token) == "solve" => in_string = false,
                 Token::Word if depth <= 0 && self.word(token) == "produce" => return false,
