@@ -61,7 +61,7 @@ fn the_colon_of_a_case_does_not_begin_a_rule_on_a_line_that_goes_on() {
         "A(x): solve dx/dt = max(1,\n  match floor(x) case 0: 1 else 2)",
         "A(x): solve dx/dt = match floor(x) case 0: 1 case 1:\n  2 case 2: 3 else 4\nB(x): solve dx/dt = 1",
     ] {
-        let text = format!("initial string: A(0.5)\n{rule}");
+        let text = format!("initial string: A(0.5) B(0)\n{rule}");
         assert_eq!(errors(&text), Vec::<String>::new(), "{text}");
     }
 }

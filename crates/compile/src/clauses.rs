@@ -1,7 +1,8 @@
 //! The clauses of a rule, lowered to the graph: conditions, productions and equations.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 
 use crate::analysis::never_reached;
 use crate::chance::{Hazard, production_keys};
@@ -13,8 +14,8 @@ use crate::rules::RuleBuilder;
 use crate::scope::Variables;
 use dlsys_diagnostic::Span;
 use dlsys_expr::{Graph, NodeId};
-use dlsys_model::{Clock, Condition, ContextPart, Input, Produce, Switch};
-use dlsys_syntax::ast::{self, Action, HeadModule};
+use dlsys_model::{Clock, Condition, ContextPart, Input, Produce, Switch, base_of};
+use dlsys_syntax::ast::{self, Action, Document, HeadModule, Item};
 use dlsys_syntax::print;
 
 /// The variables of the current rule.
@@ -59,8 +60,36 @@ struct Smooth {
     switches: Vec<Switch>,
 }
 
-/// The parameters of a module that no clause of its rule gives an equation or a value; none if some equation does not say for what it is solved.
-fn steady(rule: &ast::Rule) -> Vec<u32> {
+/// Parameters by name of the module, without its index, and the number of its parameters: those that some rule moves; None if it may move
+/// all of them.
+pub type MovingParameters = HashMap<(Arc<str>, usize), Option<HashSet<usize>>>;
+
+/// The parameters that the rules of a document move.
+pub fn moving_parameters(document: &Document) -> MovingParameters {
+    let mut all = MovingParameters::default();
+    let rules = document.items.iter().filter_map(|(item, _)| match item {
+        Item::Rule(rule) => Some(rule),
+        _ => None,
+    });
+    for rule in rules {
+        let HeadModule { name, parameters, .. } = &rule.predecessor;
+        let moving = moving(rule);
+        // One rule may stand for both turns.
+        let names: &[&str] = if &*name.text == "±" { &["+", "-"] } else { &[base_of(&name.text)] };
+        for &name in names {
+            let known = all.entry((name.into(), parameters.len())).or_insert_with(|| Some(HashSet::new()));
+            match (known.as_mut(), &moving) {
+                (Some(known), Some(moving)) => known.extend(moving),
+                _ => *known = None,
+            }
+        }
+    }
+    all
+}
+
+/// The parameters of a module that some clause of its rule gives an equation or a value; None if some equation does not say for what it is
+/// solved.
+fn moving(rule: &ast::Rule) -> Option<HashSet<usize>> {
     let equations = rule.clauses.iter().filter_map(|clause| match &clause.action {
         Action::Solve(equations) => Some(equations),
         _ => None,
@@ -72,14 +101,34 @@ fn steady(rule: &ast::Rule) -> Vec<u32> {
                 moving.push(&parameter.text);
             }
             ast::Equation::Zero { unknown: Some(unknown), .. } => moving.push(&unknown.text),
-            ast::Equation::Zero { unknown: None, .. } => return Vec::new(),
+            ast::Equation::Zero { unknown: None, .. } => return None,
         }
     }
-    let all = (0..).zip(&rule.predecessor.parameters);
-    all.filter(|(_, parameter)| !moving.contains(&&*parameter.text)).map(|(number, _)| number).collect()
+    let all = rule.predecessor.parameters.iter().enumerate();
+    Some(all.filter(|(_, parameter)| moving.contains(&&*parameter.text)).map(|(number, _)| number).collect())
 }
 
 impl RuleBuilder<'_> {
+    /// The variables of a rule, parameters of its module and of the context, that no rule moves.
+    fn steady(&self, rule: &ast::Rule) -> Vec<u32> {
+        let mut steady = Vec::new();
+        let mut first = 0;
+        let own = moving(rule);
+        for (i, module) in std::iter::once(&rule.predecessor).chain(&rule.left).chain(&rule.right).enumerate()
+        {
+            let key = (base_of(&module.name.text).into(), module.parameters.len());
+            let moves = |parameter: &usize| match (i, self.moving.get(&key)) {
+                (0, _) => own.as_ref().is_none_or(|own| own.contains(parameter)),
+                (_, Some(moving)) => moving.as_ref().is_none_or(|moving| moving.contains(parameter)),
+                (_, None) => false,
+            };
+            let rest = (0..module.parameters.len()).filter(|parameter| !moves(parameter));
+            steady.extend(rest.map(|parameter| (first + parameter) as u32));
+            first += module.parameters.len() + self.hidden(module);
+        }
+        steady
+    }
+
     /// Lowers a rule, which gets this index among those of the model. None if it has errors, which have been reported.
     pub fn rule(&mut self, rule: &ast::Rule, index: usize) -> Option<DeclaredRule> {
         let mut good = self.not_a_bracket(&rule.predecessor, false);
@@ -97,7 +146,7 @@ impl RuleBuilder<'_> {
         self.scope.gathered.clear();
         good &= self.locals(rule, &mut variables);
         let frame = Frame { rule, variables, own, count };
-        let mut atoms = Atoms::of(steady(rule));
+        let mut atoms = Atoms::of(self.steady(rule));
         let guards = self.guards(&frame, &mut atoms, &mut good);
         self.begin_handing(&rule.predecessor);
         let productions = self.productions(&frame, &guards, &mut atoms, &mut good);

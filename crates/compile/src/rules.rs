@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::advice;
 use crate::chance::Clocks;
-use crate::clauses::OutOfReach;
+use crate::clauses::{MovingParameters, OutOfReach, moving_parameters};
 use crate::declared::DeclaredPattern;
 use crate::inputs::{Handing, Inputs};
 use crate::scene_checks::MaterialNumber;
@@ -26,6 +26,8 @@ pub struct RuleBuilder<'b> {
     pub inputs: Inputs,
     /// What modules of the string that is being lowered take over from the module that they replace.
     pub(super) handing: Handing,
+    /// The parameters that rules move.
+    pub(super) moving: MovingParameters,
     /// Equations that were made smooth for rules before.
     pub(super) smoothed: Smoothed,
     /// What flows cannot reach, for rules before.
@@ -57,6 +59,7 @@ impl<'b> RuleBuilder<'b> {
             clocks,
             inputs,
             handing,
+            moving: moving_parameters(document),
             smoothed,
             out_of_reach,
             open_around,

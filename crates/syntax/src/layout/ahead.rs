@@ -4,11 +4,15 @@
 use super::{ItemKind, Last, Scanner};
 use crate::lexeme::{Token, in_name};
 
+/// Words that do not begin a value.
+const ENDS: [&str; 7] = ["then", "else", "case", "solve", "produce", "at", "in"];
+
 impl Scanner<'_> {
     /// True if a `:` stands on the line outside parentheses opened on it, and before any `produce` or arrow (a colon behind
     /// those ends a weight) and not behind a `case`, which a line may have that goes on with the expression of the line before.
     pub(super) fn has_colon(&self, tokens: &[(Token, usize, usize)]) -> bool {
         let (mut depth, mut cases) = (0i64, 0usize);
+        let mut matches = self.matching || self.level_matches();
         // A head has neither `for NAME in` nor `if`.
         let mut in_string = self.in_string || self.levels.len() > 1;
         for (i, &token) in tokens.iter().enumerate() {
@@ -17,7 +21,10 @@ impl Scanner<'_> {
                 Token::Close => depth -= 1,
                 Token::Colon if cases > 0 => cases -= 1,
                 Token::Colon if depth <= 0 => return true,
-                Token::Word if self.word(token) == "case" => cases += 1,
+                Token::Word if self.word(token) == "match" => matches = true,
+                Token::Word if matches && self.word(token) == "case" => {
+                    cases += usize::from(self.is_of_case(tokens, i));
+                }
                 Token::Word if in_string && self.begins_group(tokens, i) => return false,
                 Token::Word if self.word(token) == "solve" => in_string = false,
                 Token::Word if depth <= 0 && self.word(token) == "produce" => return false,
@@ -26,6 +33,16 @@ impl Scanner<'_> {
             }
         }
         false
+    }
+
+    /// True if a number, or a name, follows a `case`, which may also be the name of a parameter.
+    fn is_of_case(&self, tokens: &[(Token, usize, usize)], case: usize) -> bool {
+        let is_sign = |i: usize| tokens.get(i).is_some_and(|t| &self.text[t.1..t.2] == "-");
+        let value = if is_sign(case + 1) { case + 2 } else { case + 1 };
+        let is_number = tokens.get(value).is_some_and(|t| t.0 == Token::Number);
+        let is_name = tokens.get(value).is_some_and(|t| t.0 == Token::Word && !ENDS.contains(&self.word(*t)));
+        is_number && (value == case + 1 || tokens[value].1 == tokens[case + 1].2)
+            || is_name && value == case + 1
     }
 
     /// True if the second token of a line begins the value of a declaration, or the name of one: a number, `-` and what no
