@@ -259,6 +259,15 @@ fn a_rate_that_is_zero_on_the_boundary_keeps_a_module_there() {
 }
 
 #[test]
+fn a_signal_passes_along_many_modules_at_once() {
+    let string = "initial string: X(0) for i in 1 .. 300: ( V(0) ) L(0)\nX(x): solve dx/dt = 1\n";
+    let row = "X(x) < V(v): solve v = if x > 0.5 then 1 else 0\nV(p) < V(v): solve v = if p > 0.5 then 1 else 0\nV(p) < L(y): solve dy/dt = p";
+    let strings =
+        run(&format!("{string}{row}"), Settings::default(), &[2.0]).unwrap_or_else(|e| panic!("{e}"));
+    assert!((strings[0].last().expect("L is there").1[0] - 1.5).abs() < 1e-6, "{:?}", strings[0].last());
+}
+
+#[test]
 fn a_row_settles_from_either_end() {
     for (head, seen) in
         [("A(x) > A(p)", "A(2) A(0) A(2) A(0) A(2)"), ("A(p) < A(x)", "A(2) A(0) A(2) A(0) A(2)")]

@@ -14,7 +14,8 @@ use dlsys_tree::ModuleId;
 
 /// Values that differ by more than so many tolerances have jumped; a smaller difference may be their error.
 const JUMP: f64 = 10.0;
-/// Most times at one instant that values change and conditions with them.
+/// Most times at one instant that values change and conditions with them, beyond one for each module that the instant concerns: a signal may
+/// pass from one to the next.
 const MAX_ROUNDS: usize = 100;
 
 /// Modules whose solved values are others than before.
@@ -36,7 +37,7 @@ impl EventStage<'_, '_> {
         let mut matters = self.solve_again(chosen)?;
         // Before anything is judged, the equations have the sides of their conditions on which their solutions are.
         while !chosen && self.take_sides() {
-            if self.events.consistency_rounds > MAX_ROUNDS {
+            if self.events.consistency_rounds > MAX_ROUNDS + self.events.opened.len() {
                 let id = self.events.opened[0];
                 let site = self.world.site_of_rule(self.setup.model, id, self.instant.at);
                 return Err(Error::Chattering { site });
@@ -91,7 +92,7 @@ impl EventStage<'_, '_> {
                 matters |= self.place_again(id, changed.contains(&id), jumps);
             }
         }
-        if matters && self.events.consistency_rounds > MAX_ROUNDS {
+        if matters && self.events.consistency_rounds > MAX_ROUNDS + self.events.opened.len() {
             let id = changed[0];
             let site = self.world.site_of_rule(self.setup.model, id, self.instant.at);
             return Err(Error::Chattering { site });
