@@ -330,16 +330,8 @@ impl Follower<'_, '_> {
             strings.iter().map(one).collect()
         };
         let share = strings.len().div_ceil(self.threads.max(1)).max(1);
-        let parts: Vec<Result<Vec<Sample>, Error>> = std::thread::scope(|scope| {
-            let (own, others) = strings.split_at(share.min(strings.len()));
-            let others: Vec<_> =
-                others.chunks(share).map(|strings| scope.spawn(move || draw(strings))).collect();
-            let own = draw(own);
-            let joined = others
-                .into_iter()
-                .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-            std::iter::once(own).chain(joined).collect()
-        });
+        let parts: Vec<Result<Vec<Sample>, Error>> =
+            dlsys_threads::in_order(self.threads, strings.chunks(share).collect(), draw);
         let mut samples = Vec::with_capacity(strings.len());
         for part in parts {
             samples.extend(part?);

@@ -93,12 +93,7 @@ pub(crate) fn vary<T: Send>(
     for batch in times.chunks(options.threads.max(1)) {
         let strings = strings(&mut simulation, batch, options, end)?;
         let draw = |strings: Strings| draughts.frame(&strings).map(|varied| work(varied, &palette));
-        let made: Vec<Result<T, Error>> = std::thread::scope(|scope| {
-            let all: Vec<_> = strings.into_iter().map(|job| scope.spawn(move || draw(job))).collect();
-            all.into_iter()
-                .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-                .collect()
-        });
+        let made: Vec<Result<T, Error>> = dlsys_threads::in_order(options.threads, strings, draw);
         for (time, made) in batch.iter().zip(made) {
             take(*time, made?)?;
         }

@@ -8,9 +8,9 @@ use std::collections::HashMap;
 
 use super::Fit;
 use super::draft::{Detail, Draft};
-use super::threads::side_by_side;
 use super::triangles::Triangle;
 use dlsys_geometry::scene::{MaterialId, Placement, Point, Scene, Texture, Vector};
+use dlsys_threads::each;
 
 /// Triangles and thin stems in a batch.
 const BATCH: usize = 1 << 16;
@@ -203,7 +203,7 @@ impl<'s> Casters<'s> {
         let (mut count, mut kept) = (0, 0);
         let mut drafts = Vec::with_capacity(self.groups.len());
         for groups in self.groups.chunks(SIDE_BY_SIDE) {
-            for measured in side_by_side(groups.len(), threads, |i| self.measured(&groups[i])) {
+            for measured in each(threads, groups.len(), |i| self.measured(&groups[i])) {
                 around.merge(&measured.soil);
                 core.merge(&measured.around);
                 count += measured.count;

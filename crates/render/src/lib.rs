@@ -85,7 +85,6 @@ mod stage;
 mod strips;
 mod stroke;
 mod text;
-mod threads;
 mod trace;
 mod triangles;
 mod triangulate;

@@ -10,9 +10,9 @@ use super::mapping::{Cut, Mapping, Pinned};
 use super::raster::{self, Image, Pattern, Place};
 use super::stage::{Part, Stage};
 use super::strips::Census;
-use super::threads::side_by_side;
 use super::veil::Veil;
 use dlsys_geometry::scene::{Color, Point, Texture, Vector};
+use dlsys_threads::each;
 
 /// Most triangles that are in memory at a time: a picture with more is drawn in strips.
 const MOST: usize = 6_000_000;
@@ -158,7 +158,7 @@ impl<'a> Shot<'a> {
             stage.with_draft(part, |draft| shot.add(draft, part));
             shot
         };
-        for shot in side_by_side(block.len(), threads, make) {
+        for shot in each(threads, block.len(), make) {
             self.append(&shot);
             ends.push(self.faces.len());
         }

@@ -26,7 +26,6 @@ mod looks;
 mod nursery;
 pub mod replay;
 mod swaying;
-mod threads;
 
 pub use gauge::Detail;
 pub use nursery::{DrawError, Nursery};

@@ -15,7 +15,6 @@ use crate::bed::{Bed, Grown};
 use crate::gauge::{Detail, Gauge};
 use crate::looks::Sight;
 use crate::swaying::{Around, SwayReport, Swaying, sways};
-use crate::threads;
 use dlsys_diagnostic::Diagnostic;
 use dlsys_geometry::scene::{Bounds, Color, MaterialId, Plant, Scene, Seedling, Width};
 use dlsys_geometry::turtle::{self, Strains};
@@ -369,7 +368,7 @@ impl<'m> Nursery<'m> {
             bed.divide(key(&seedlings[group[0]]), group, growing, &mut jobs)?;
         }
         let mut drawn: Vec<Option<Plant>> = vec![None; seedlings.len()];
-        for done in threads::in_order(self.threads, jobs, |job| bed.grow(job)) {
+        for done in dlsys_threads::in_order(self.threads, jobs, |job| bed.grow(job)) {
             let Grown { plants, kept, warnings, lacked_accuracy } = done?;
             for (i, plant) in plants {
                 drawn[i] = Some(plant);

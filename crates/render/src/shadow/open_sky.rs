@@ -10,8 +10,8 @@
 
 use super::{BIAS, Fineness, Map, Maps, SLOPE};
 use crate::casters::Reach;
-use crate::threads::side_by_side;
 use dlsys_geometry::scene::Vector;
+use dlsys_threads::each;
 
 /// Layers by distance along the light, in cells: up to 2, 4, 8 and so on.
 const LAYERS: usize = 9;
@@ -50,7 +50,7 @@ impl OpenSky {
         let side = fineness.floor;
         let scale = (side - 1) as f64 / (2.0 * reach);
         let count = maps.sky.len();
-        let shades = side_by_side(count, threads, |i| Shade::new(&maps.sky[i], height, count));
+        let shades = each(threads, count, |i| Shade::new(&maps.sky[i], height, count));
         let row = |row: usize| {
             let first = Vector::new(low[0], height, low[1] + row as f64 / scale);
             let mut open = vec![0.0_f32; side];
@@ -61,7 +61,7 @@ impl OpenSky {
             open.iter_mut().for_each(|part| *part = (*part * 2.0 / count.max(1) as f32).min(1.0));
             open
         };
-        OpenSky { low, scale, side, parts: side_by_side(side, threads, row).concat() }
+        OpenSky { low, scale, side, parts: each(threads, side, row).concat() }
     }
 
     /// The part at a place; 1 beyond the grid, to which it rises at the rim.

@@ -19,7 +19,6 @@ mod law;
 mod order;
 mod plan;
 mod straight;
-mod threads;
 
 use crate::kernel::Simulation;
 use crate::log::Event;

@@ -3,7 +3,6 @@
 use dlsys_tree::SimTime;
 use std::cmp::Ordering;
 
-use super::threads;
 use crate::schedule::sort_by_time;
 
 /// A production of a chain.
@@ -97,7 +96,7 @@ fn in_ranges(lists: &[Vec<Happened>], threads: usize) -> Vec<Range> {
         1 => 0,
         _ => (((event.at.to_f64() - first) * scale) as usize).min(count - 1),
     };
-    threads::each(threads, count, |number| {
+    dlsys_threads::each(threads, count, |number| {
         Range::of(lists.iter().flatten().filter(|event| range_of(event) == number).copied().collect())
     })
 }

@@ -11,7 +11,6 @@ use dlsys_tree::{Family, Lineage, NO_LABEL, SimTime, Tree};
 use super::lanes::{Block, Fate};
 use super::law::Law;
 use super::order::Happened;
-use super::threads;
 use crate::event::SHORT_LIFE;
 use crate::world::life::Lives;
 
@@ -128,7 +127,7 @@ pub fn plans(course: Course, slots: &[u32], threads: usize) -> Vec<Plan> {
         _ => slots.len().div_ceil(PARTS * threads).max(LANES),
     };
     let chunks: Vec<&[u32]> = slots.chunks(size.max(1)).collect();
-    threads::each(threads, chunks.len(), |number| Planner::new(course).plan(chunks[number]))
+    dlsys_threads::each(threads, chunks.len(), |number| Planner::new(course).plan(chunks[number]))
 }
 
 /// The productions of some plans, one list for each, and what is logged of all of them, by entry.
