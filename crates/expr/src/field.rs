@@ -133,7 +133,7 @@ mod tests {
         program.eval(&at, &mut Vec::new(), &mut out);
         // 3 t (2x)², and its derivative 24 t x.
         assert_eq!(out, [6.0, 24.0]);
-        let mut lanes = at.map(|x| [x; crate::LANES]).to_vec();
+        let mut lanes = at.map(crate::Lanes::all).to_vec();
         let registers: Vec<usize> = program.eval_lanes(&mut lanes).collect();
         assert_eq!(registers.iter().map(|register| lanes[*register][7]).collect::<Vec<_>>(), [6.0, 24.0]);
         let moving = [(2.0, 1.0), (0.5, 3.0), (7.0, 5.0), (-1.0, 0.0)];

@@ -162,7 +162,8 @@ impl Value for f64 {
         x
     }
 
-    #[inline]
+    // Interpreters call it in one place each.
+    #[inline(always)]
     fn unary(op: Unary, a: f64) -> f64 {
         match op {
             Unary::Neg => -a,

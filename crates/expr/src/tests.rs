@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use dlsys_wide::Width;
 
 /// Every operation once, as an expression of x (variable 0) and y (variable 1).
 fn all() -> (Graph, Vec<(String, NodeId)>) {
@@ -44,23 +45,24 @@ fn all() -> (Graph, Vec<(String, NodeId)>) {
     (g, list)
 }
 
-/// Many rows at once give each row the bits that it has alone, however many there are.
+/// Many rows at once give each row the bits that it has alone, however many there are and however wide registers are.
 #[test]
 fn rows_are_what_each_is_alone() {
     let (graph, list) = all();
     let at = |row: usize| [0.1 + 0.37 * row as f64 - 3.0, 2.5 - 0.21 * row as f64];
     for (name, node) in list {
         let program = Program::compile(&graph, &[node], 2);
-        for rows in [1, 7, 8, 9, 16, 17, LANES] {
-            let mut registers = vec![[f64::NAN; LANES]; 2];
+        for (rows, width) in [1, 7, 8, 9, 16, 17, LANES].into_iter().flat_map(|n| Width::ALL.map(|w| (n, w)))
+        {
+            let mut registers = vec![Lanes::all(f64::NAN); 2];
             for (register, variable) in registers.iter_mut().zip([0, 1]) {
                 register.iter_mut().take(rows).enumerate().for_each(|(row, x)| *x = at(row)[variable]);
             }
-            let output = program.eval_rows(&mut registers, rows).next().expect("one root");
-            for (row, together) in registers[output].into_iter().enumerate().take(rows) {
+            let output = program.eval_rows_with(width, &mut registers, rows).next().expect("one root");
+            for (row, together) in registers[output].iter().copied().enumerate().take(rows) {
                 let alone = program.eval_one(&at(row));
                 let same = together.to_bits() == alone.to_bits() || together.is_nan() && alone.is_nan();
-                assert!(same, "{name}, row {row} of {rows}: {together}, not {alone}");
+                assert!(same, "{name}, row {row} of {rows}, {width:?}: {together}, not {alone}");
             }
         }
     }
@@ -89,13 +91,55 @@ fn sums_of_products_are_rounded_twice() {
     assert_ne!(expected, f64::mul_add(-a, a, low) - p, "the second rounding shows");
     let program = Program::compile(&g, &[again], 2);
     assert_eq!(program.eval_one(&[a, b]).to_bits(), expected.to_bits());
-    let mut registers = vec![[a; LANES], [b; LANES]];
+    let mut registers = vec![Lanes::all(a), Lanes::all(b)];
     let output = program.eval_lanes(&mut registers).next().expect("one root");
     assert_eq!(registers[output].map(f64::to_bits), [expected.to_bits(); LANES]);
     let sums = Program::compile(&g, &[rest, product], 2);
     let mut out = [0.0; 2];
     sums.eval(&[a, b], &mut Vec::new(), &mut out);
     assert_eq!(out, [more - r, p]);
+}
+
+/// The same of chains of operations on several variables, whose registers are used again.
+#[test]
+fn rows_of_random_programs_are_what_each_is_alone() {
+    const OPS: [Binary; 7] =
+        [Binary::Add, Binary::Sub, Binary::Mul, Binary::Div, Binary::Min, Binary::Max, Binary::Lt];
+    let mut seed = 1u64;
+    let mut random = |below: usize| {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 33) as usize % below
+    };
+    for _ in 0..200 {
+        let mut graph = Graph::default();
+        let mut nodes: Vec<NodeId> = (0..4).map(|v| graph.var(v)).collect();
+        nodes.push(graph.constant(random(100) as f64 / 7.0 - 5.0));
+        for _ in 0..2 + random(20) {
+            let [a, b] = [0; 2].map(|_| nodes[random(nodes.len())]);
+            nodes.push(match random(10) {
+                0 => graph.unary(Unary::Sin, a),
+                1 => graph.unary(Unary::Neg, a),
+                _ => graph.binary(OPS[random(OPS.len())], a, b),
+            });
+        }
+        let roots = [nodes[nodes.len() - 1], nodes[nodes.len() - 2]];
+        let program = Program::compile(&graph, &roots, 4);
+        let rows = 1 + random(LANES);
+        let values = [0; 4].map(|_| Lanes(std::array::from_fn(|_| random(4000) as f64 / 500.0 - 4.0)));
+        for width in Width::ALL {
+            let mut registers = values.to_vec();
+            let outputs: Vec<usize> = program.eval_rows_with(width, &mut registers, rows).collect();
+            for row in 0..rows {
+                let mut alone = [0.0; 2];
+                program.eval(&values.map(|lanes| lanes[row]), &mut Vec::new(), &mut alone);
+                for (output, alone) in outputs.iter().zip(alone) {
+                    let together = registers[*output][row];
+                    let same = together.to_bits() == alone.to_bits() || together.is_nan() && alone.is_nan();
+                    assert!(same, "row {row} of {rows}, {width:?}: {together}, not {alone}, in {program:?}");
+                }
+            }
+        }
+    }
 }
 
 #[test]

@@ -16,6 +16,7 @@
 
 #![warn(missing_docs)]
 
+mod column;
 mod control;
 mod dense;
 mod error;

@@ -1,6 +1,7 @@
 //! The working memory that all methods share, and the measurements on a step that need no knowledge of the method.
 
 use crate::Rates;
+use crate::column::Column;
 use crate::one_step::Trial;
 
 /// Errors below the tolerated part of this are ignored, whatever the size of the component.
@@ -23,20 +24,15 @@ pub(crate) const PART: usize = 8;
 /// The most stages of a method: those of DOP853 with its dense output.
 pub(crate) const MAX_STAGES: usize = 16;
 
-/// [`PART`] components of some rates, from `first` on.
-pub(crate) fn part(k: &[f64], first: usize) -> &[f64; PART] {
-    k[first..first + PART].try_into().expect("states and rates are padded to whole parts")
-}
-
 /// Working memory of a step: states and rates of all components.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
     /// The state at the start of the step.
-    pub(crate) from: Vec<f64>,
+    pub(crate) from: Column,
     /// Rates at the stages; the first is that of the start of the step.
-    pub(crate) k: Vec<Vec<f64>>,
+    pub(crate) k: Vec<Column>,
     /// The state at which the rates of a stage are evaluated.
-    pub(crate) stage: Vec<f64>,
+    pub(crate) stage: Column,
     /// The state of the stage before the last, where that is also at the end of the step.
     pub(crate) other_end: Vec<f64>,
     /// The state at the end of the step.
@@ -64,13 +60,11 @@ impl Workspace {
         }
         let places = n.next_multiple_of(PART);
         if self.k.first().is_none_or(|k| k.len() != places) {
-            self.k.resize(MAX_STAGES, Vec::new());
-            for k in &mut self.k {
-                k.resize(places, 0.0);
-            }
+            self.k.resize(MAX_STAGES, Column::default());
+            self.k.iter_mut().for_each(|k| k.resize(places));
         }
-        self.from.resize(places, 0.0);
-        self.stage.resize(places, 0.0);
+        self.from.resize(places);
+        self.stage.resize(places);
         self.other_end.resize(n, 0.0);
         self.end.resize(n, 0.0);
     }
@@ -134,12 +128,14 @@ impl Workspace {
 
     /// The outcome of a step with these errors whose end and whose rates there, those of stage `last`, are known.
     pub(crate) fn outcome(&self, error: f64, rounding: f64, last: usize) -> Trial {
-        let bad = self.end.iter().position(|x| !x.is_finite());
         let rates = &self.k[last][..self.end.len()];
-        match bad.or_else(|| rates.iter().position(|x| !x.is_finite())) {
-            None if error.is_finite() => Trial::Done { error, rounding },
-            at => Trial::NotFinite(at.unwrap_or(0)),
+        // All are looked at before any is searched for: that goes side by side.
+        let are_finite = |all: &[f64]| all.iter().fold(true, |finite, x| finite & x.is_finite());
+        if error.is_finite() && are_finite(&self.end) && are_finite(rates) {
+            return Trial::Done { error, rounding };
         }
+        let first_bad = |all: &[f64]| all.iter().position(|x| !x.is_finite());
+        Trial::NotFinite(first_bad(&self.end).or_else(|| first_bad(rates)).unwrap_or(0))
     }
 
     /// The length of a first step over which the solution changes little, for a method of order `order`: in units of simulated time,
@@ -164,7 +160,7 @@ impl Workspace {
             *s = y + guess * f;
         }
         self.evaluate(system, guess, 1);
-        let bend: Vec<f64> = self.k[1].iter().zip(&self.k[0]).map(|(a, b)| a - b).collect();
+        let bend: Vec<f64> = self.k[1].iter().zip(self.k[0].iter()).map(|(a, b)| a - b).collect();
         let most = d1.max(norm(&bend) / guess);
         let order = f64::from(order + 1);
         let next = if most <= 1e-15 { (guess * 1e-3).max(1e-6) } else { (0.01 / most).powf(1.0 / order) };

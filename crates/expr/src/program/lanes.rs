@@ -2,12 +2,46 @@
 
 use super::{Instruction, Program, Register};
 use crate::{Binary, Unary, Value};
+use dlsys_wide::Kernel;
+use std::ops::{Deref, DerefMut};
 
 /// Rows that are evaluated at once by [`Program::eval_lanes`].
 pub const LANES: usize = 32;
 
-/// One value of each row.
-pub type Lanes = [f64; LANES];
+/// One value of each row. The widest registers of a processor take a whole line of its cache at once, if numbers lie there that way: loads
+/// and stores across two lines take twice as long.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
+pub struct Lanes(pub [f64; LANES]);
+
+impl Lanes {
+    /// The same number in all rows.
+    pub const fn all(x: f64) -> Lanes {
+        Lanes([x; LANES])
+    }
+}
+
+impl Default for Lanes {
+    fn default() -> Lanes {
+        Lanes::all(0.0)
+    }
+}
+
+impl Deref for Lanes {
+    type Target = [f64; LANES];
+
+    #[inline(always)]
+    fn deref(&self) -> &[f64; LANES] {
+        &self.0
+    }
+}
+
+impl DerefMut for Lanes {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [f64; LANES] {
+        &mut self.0
+    }
+}
 
 /// Lanes that fit into the processor's registers together, so that the result may overwrite an operand without a copy.
 const PART: usize = 8;
@@ -62,6 +96,23 @@ fn each_of(
     }
 }
 
+/// All instructions of a program, for some rows.
+struct Run<'r> {
+    program: &'r Program,
+    registers: &'r mut Vec<Lanes>,
+    rows: usize,
+}
+
+impl Kernel for Run<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        // Where the outputs are is asked afterwards.
+        let _ = self.program.eval_rows_inside(self.registers, self.rows);
+    }
+}
+
 impl Program {
     /// Evaluates all roots for many rows at once: register v of `registers` holds variable v of every row. Every
     /// operation runs over all rows before the next, and gives each the same bits as [`Program::eval`]. Returns the
@@ -76,8 +127,31 @@ impl Program {
         registers: &mut Vec<Lanes>,
         rows: usize,
     ) -> impl ExactSizeIterator<Item = usize> + '_ {
+        dlsys_wide::run(Run { program: self, registers, rows });
+        self.outputs.iter().map(|&register| register as usize)
+    }
+
+    /// The same with registers of a given width.
+    #[cfg(test)]
+    pub fn eval_rows_with(
+        &self,
+        width: dlsys_wide::Width,
+        registers: &mut Vec<Lanes>,
+        rows: usize,
+    ) -> impl ExactSizeIterator<Item = usize> + '_ {
+        dlsys_wide::run_with(width, Run { program: self, registers, rows });
+        self.outputs.iter().map(|&register| register as usize)
+    }
+
+    /// The same inside a [`Kernel`], of which it becomes a part.
+    #[inline(always)]
+    pub fn eval_rows_inside(
+        &self,
+        registers: &mut Vec<Lanes>,
+        rows: usize,
+    ) -> impl ExactSizeIterator<Item = usize> + '_ {
         if registers.len() < self.registers {
-            registers.resize(self.registers, [0.0; LANES]);
+            registers.resize(self.registers, Lanes::default());
         }
         // Loops of a length that is known when this is compiled take two thirds of the instructions.
         match rows.div_ceil(PART) {
@@ -89,6 +163,7 @@ impl Program {
     }
 
     /// Carries out all instructions for so many parts of the lanes, of which `rows` lanes count.
+    #[inline(always)]
     fn run<const PARTS: usize>(&self, registers: &mut [Lanes], rows: usize) {
         for instruction in &self.code {
             match *instruction {
@@ -153,6 +228,7 @@ impl Program {
     }
 
     /// Carries out an instruction that is more than arithmetic, row by row.
+    #[inline(never)]
     fn carry_out(&self, instruction: Instruction, registers: &mut [Lanes], rows: usize) {
         match instruction {
             Instruction::Const(to, x) => each_of(registers, rows, [to, to, to], &mut |_, _| x),
@@ -173,7 +249,7 @@ impl Program {
             }
             Instruction::Select(to, c, a, b) => {
                 let (c, a, b) = (registers[c as usize], registers[a as usize], registers[b as usize]);
-                registers[to as usize] = std::array::from_fn(|i| f64::select(c[i], a[i], b[i]));
+                registers[to as usize] = Lanes(std::array::from_fn(|i| f64::select(c[i], a[i], b[i])));
             }
             Instruction::Curve(curve, part, to, a) => {
                 let curve = &self.curves[curve as usize];
@@ -190,7 +266,8 @@ impl Program {
             Instruction::Field(field, part, to, at) => {
                 let (field, at) = (&self.fields[field as usize], at.map(|of| registers[of as usize]));
                 let value = |i: usize| field.value(part, [at[0][i], at[1][i], at[2][i], at[3][i]]);
-                registers[to as usize] = std::array::from_fn(|i| if i < rows { value(i) } else { f64::NAN });
+                registers[to as usize] =
+                    Lanes(std::array::from_fn(|i| if i < rows { value(i) } else { f64::NAN }));
             }
         }
     }

@@ -5,9 +5,10 @@
 
 use super::explicit::{Pair, Tableau};
 use crate::Rates;
+use crate::column::Column;
 use crate::dense::{Dense, PLACE};
 use crate::one_step::InteriorError;
-use crate::workspace::{FLOOR, PART, Workspace, part};
+use crate::workspace::{FLOOR, MAX_STAGES, Workspace};
 
 /// The method: 12 stages and the rate at the end, three more for the dense output.
 #[derive(Clone, Debug)]
@@ -20,16 +21,27 @@ impl Pair for Dop853 {
     const STABILITY: f64 = 1.9;
     const INTERIOR_IS_MEASURED: bool = true;
 
-    fn dense(y: &[f64], end: &[f64], k: &[Vec<f64>], first: usize, h: f64, out: &mut Vec<f64>) {
-        if let ([y], [end]) = (y, end) {
-            let hk = std::array::from_fn(|stage| [h * k[stage][first]]);
-            return out.extend_from_slice(dop853_dense(&[*y], &[*end], &hk).as_flattened());
+    #[inline(always)]
+    fn dense<const N: usize>(
+        y: &[f64; N],
+        end: &[f64; N],
+        k: &[Column; MAX_STAGES],
+        first: usize,
+        h: f64,
+        count: usize,
+        out: &mut Vec<f64>,
+    ) {
+        let mut hk = [[0.0; N]; 16];
+        for (hk, k) in hk.iter_mut().zip(k) {
+            if N == 1 {
+                hk[0] = h * k.at(first);
+                continue;
+            }
+            for (hk, k) in hk.iter_mut().zip(&k[first..first + N]) {
+                *hk = h * k;
+            }
         }
-        let (mut from, mut to) = ([0.0; PART], [0.0; PART]);
-        from[..y.len()].copy_from_slice(y);
-        to[..y.len()].copy_from_slice(end);
-        let hk = std::array::from_fn(|stage| part(&k[stage], first).map(|k| h * k));
-        out.extend_from_slice(dop853_dense(&from, &to, &hk)[..y.len()].as_flattened());
+        out.extend_from_slice(dop853_dense(y, end, &hk)[..count].as_flattened());
     }
 
     /// The dense output may err a thousand times more than the end of the step where the step is twice as long as stability allows,
@@ -169,16 +181,15 @@ pub static DOP853: Tableau = Tableau {
 /// This is the formula of the code DOP853 for a single component, for a maximum norm over the components.
 /// It is homogeneous, so the estimates may be divided by the tolerance before or the result after. It gives
 /// infinity when an estimate is not finite, because a NaN would be lost in `f64::max`.
+#[inline(always)]
 pub(super) fn join_estimates(e5: f64, e3: f64) -> f64 {
-    if !e5.is_finite() || !e3.is_finite() {
-        return f64::INFINITY;
-    }
-    if e5 == 0.0 {
-        return 0.0;
-    }
+    // All is computed, and chosen from, so that many components go side by side.
     let ratio = (0.1 * e3 / e5).abs();
+    let root = (1.0 + ratio * ratio).sqrt();
     // A square of more than that may overflow, and 1 does not count beside it.
-    if ratio > 1e100 { e5.abs() / ratio } else { e5.abs() / (1.0 + ratio * ratio).sqrt() }
+    let joined = e5.abs() / if ratio > 1e100 { ratio } else { root };
+    let joined = if e5 == 0.0 { 0.0 } else { joined };
+    if e5.is_finite() & e3.is_finite() { joined } else { f64::INFINITY }
 }
 
 /// Dense output weights applied to the stage rates of some components, side by side.
@@ -204,20 +215,21 @@ fn dense_sum<const N: usize>(d: &[f64], hk: &[[f64; N]; 16]) -> [f64; N] {
 /// `s^2(1-s)^2 (r5 + s (r6 + (1-s) (r7 + s r8)))`, where `r5..r8` are the sums `sum_i d_i hk_i`.
 /// The ends are exact: `b_0 = y0`, `b_7 = y1`; the slopes there are `hk1` and `hk13`.
 /// Its error in a step falls like `h^8`.
-#[inline]
+#[inline(always)]
 pub(super) fn dop853_dense<const N: usize>(
     y0: &[f64; N],
     y1: &[f64; N],
     hk: &[[f64; N]; 16],
 ) -> [[f64; 8]; N] {
-    let sums = [0, 1, 2, 3].map(|i: usize| dense_sum(DOP853.d[i], hk));
-    std::array::from_fn(|j| {
+    let [r5, r6, r7, r8] = [0, 1, 2, 3].map(|i: usize| dense_sum(DOP853.d[i], hk));
+    let mut all = [[0.0; 8]; N];
+    for (j, all) in all.iter_mut().enumerate() {
         let (y0, y1, first, end) = (y0[j], y1[j], hk[0][j], hk[12][j]);
         let dy = y1 - y0;
-        let [r5, r6, r7, r8] = sums.map(|sum| sum[j]);
+        let [r5, r6, r7, r8] = [r5[j], r6[j], r7[j], r8[j]];
         // The Hermite cubic raised to degree 7, plus s^i (1-s)^j raised to the same degree. Every coefficient is
         // built from the nearer end, so that small changes are added to the large value once.
-        [
+        *all = [
             y0,
             y0 + first / 7.0,
             y0 + (dy / 7.0 + (4.0 * first - end + r5) / 21.0),
@@ -226,6 +238,7 @@ pub(super) fn dop853_dense<const N: usize>(
             y1 - (dy / 7.0 + (4.0 * end - first - r5 - r6) / 21.0),
             y1 - end / 7.0,
             y1,
-        ]
-    })
+        ];
+    }
+    all
 }

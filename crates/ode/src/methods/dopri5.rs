@@ -4,7 +4,8 @@
 //! E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed. 1993, sections II.5 and II.6.
 
 use super::explicit::{Pair, Tableau};
-use crate::workspace::{PART, part};
+use crate::column::Column;
+use crate::workspace::MAX_STAGES;
 
 /// The pair: 7 stages, order 5, dense output of degree 4.
 #[derive(Clone, Debug)]
@@ -15,17 +16,27 @@ impl Pair for Dopri5 {
     const DEGREE: usize = 4;
     const STABILITY: f64 = 2.8;
 
-    fn dense(y: &[f64], end: &[f64], k: &[Vec<f64>], first: usize, h: f64, out: &mut Vec<f64>) {
-        if let ([y], [end]) = (y, end) {
-            // Alone, as most modules that are integrated on their own.
-            let hk = std::array::from_fn(|stage| [h * k[stage][first]]);
-            return out.extend_from_slice(dopri5_dense(&[*y], &[*end], &hk).as_flattened());
+    #[inline(always)]
+    fn dense<const N: usize>(
+        y: &[f64; N],
+        end: &[f64; N],
+        k: &[Column; MAX_STAGES],
+        first: usize,
+        h: f64,
+        count: usize,
+        out: &mut Vec<f64>,
+    ) {
+        let mut hk = [[0.0; N]; 7];
+        for (hk, k) in hk.iter_mut().zip(k) {
+            if N == 1 {
+                hk[0] = h * k.at(first);
+                continue;
+            }
+            for (hk, k) in hk.iter_mut().zip(&k[first..first + N]) {
+                *hk = h * k;
+            }
         }
-        let (mut from, mut to) = ([0.0; PART], [0.0; PART]);
-        from[..y.len()].copy_from_slice(y);
-        to[..y.len()].copy_from_slice(end);
-        let hk = std::array::from_fn(|stage| part(&k[stage], first).map(|k| h * k));
-        out.extend_from_slice(dopri5_dense(&from, &to, &hk)[..y.len()].as_flattened());
+        out.extend_from_slice(dopri5_dense(y, end, &hk)[..count].as_flattened());
     }
 }
 
@@ -66,7 +77,7 @@ pub static DOPRI5: Tableau = Tableau {
 /// `y0 + s r2 + s(1-s) r3 + s^2(1-s) r4 + s^2(1-s)^2 r5` of the code DOPRI5 (Hairer, Norsett, Wanner, II.6).
 /// The ends are exact: `b_0 = y0`, `b_4 = y1`; the slopes there are `hk1` and `hk7`.
 /// Its error in a step falls like `h^5`.
-#[inline]
+#[inline(always)]
 pub(super) fn dopri5_dense<const N: usize>(
     y0: &[f64; N],
     y1: &[f64; N],
@@ -80,8 +91,10 @@ pub(super) fn dopri5_dense<const N: usize>(
             r5[j] += d * (k[j] - first[j]);
         }
     }
-    std::array::from_fn(|j| {
+    let mut all = [[0.0; 5]; N];
+    for (j, all) in all.iter_mut().enumerate() {
         let middle = y0[j] + (0.5 * (y1[j] - y0[j]) + (first[j] - end[j] + r5[j]) / 6.0);
-        [y0[j], y0[j] + first[j] / 4.0, middle, y1[j] - end[j] / 4.0, y1[j]]
-    })
+        *all = [y0[j], y0[j] + first[j] / 4.0, middle, y1[j] - end[j] / 4.0, y1[j]];
+    }
+    all
 }

@@ -20,7 +20,7 @@ impl OneStep for Euler {
     }
 
     fn attempt(&mut self, work: &mut Workspace, _: &mut impl Rates, step: Step<'_>, _: f64) -> Trial {
-        for (end, (y, k)) in work.end.iter_mut().zip(step.y.iter().zip(&work.k[0])) {
+        for (end, (y, k)) in work.end.iter_mut().zip(step.y.iter().zip(work.k[0].iter())) {
             *end = y + step.h * k;
         }
         work.outcome(0.0, 0.0, 0)

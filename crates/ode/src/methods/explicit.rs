@@ -7,11 +7,13 @@
 //! Sources: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed. 1993, sections II.4 (step
 //! control), II.5 (pairs) and II.6 (dense output); the same authors' II (1996), section IV.2 (stiffness).
 
-use super::dop853::join_estimates;
+mod columns;
+
 use crate::Rates;
+use crate::column::Column;
 use crate::dense::Dense;
 use crate::one_step::{InteriorError, OneStep, Step, Trial};
-use crate::workspace::{FLOOR, MAX_STAGES, PART, Workspace, part, part_of_sum};
+use crate::workspace::{MAX_STAGES, Workspace};
 use dlsys_expr::SimTime;
 use std::marker::PhantomData;
 
@@ -59,9 +61,17 @@ pub trait Pair: Clone {
     /// As [`OneStep::INTERIOR_IS_MEASURED`].
     const INTERIOR_IS_MEASURED: bool = false;
 
-    /// Appends the dense output of [`PART`] components at most, from `first` on, to `out`: `DEGREE + 1` Bernstein coefficients for
-    /// each. `y` and `end` are their values at the ends of the step, `k` the rates at all stages.
-    fn dense(y: &[f64], end: &[f64], k: &[Vec<f64>], first: usize, h: f64, out: &mut Vec<f64>);
+    /// Appends the dense output of `count` of `N` components, from `first` on, to `out`: `DEGREE + 1` Bernstein coefficients for each. `y` and
+    /// `end` are their values at the ends of the step, `k` the rates of all components at all stages.
+    fn dense<const N: usize>(
+        y: &[f64; N],
+        end: &[f64; N],
+        k: &[Column; MAX_STAGES],
+        first: usize,
+        h: f64,
+        count: usize,
+        out: &mut Vec<f64>,
+    );
 
     /// As [`OneStep::interior_error`].
     fn interior_error(
@@ -136,10 +146,7 @@ impl<P: Pair> OneStep for Explicit<P> {
             work.reach(false);
             work.evaluate(system, tableau.c[i] * h, i);
         }
-        let mut c = Vec::with_capacity(y.len() * (P::DEGREE + 1));
-        for (block, (y, end)) in y.chunks(PART).zip(work.end.chunks(PART)).enumerate() {
-            P::dense(y, end, &work.k, block * PART, h, &mut c);
-        }
+        let c = work.polynomials::<P>(y, h);
         Dense::new(start, end, h, P::DEGREE, c)
     }
 
@@ -159,70 +166,6 @@ impl<P: Pair> OneStep for Explicit<P> {
     }
 }
 
-/// So few components are summed one by one, in the same order as many.
-const FEW: usize = 2;
-
-/// The weights of a sum over stages. They are known when this is compiled, so that zeros cost nothing and no loop is left.
-trait Weights {
-    const WEIGHTS: &'static [f64];
-}
-
-/// The weights of the state at which stage `I` is evaluated.
-struct StageOf<P, const I: usize>(PhantomData<P>);
-
-/// The weights of error estimate `I`.
-struct EstimateOf<P, const I: usize>(PhantomData<P>);
-
-impl<P: Pair, const I: usize> Weights for StageOf<P, I> {
-    const WEIGHTS: &'static [f64] = row(P::TABLEAU.a, I);
-}
-
-impl<P: Pair, const I: usize> Weights for EstimateOf<P, I> {
-    const WEIGHTS: &'static [f64] = row(P::TABLEAU.e, I);
-}
-
-/// A row of a table; empty beyond its end.
-const fn row(table: &'static [&'static [f64]], i: usize) -> &'static [f64] {
-    if i < table.len() { table[i] } else { &[] }
-}
-
-/// The rates at all stages, in parts.
-type Parts<'k> = [&'k [[f64; PART]]; MAX_STAGES];
-
-/// The first `blocks` parts of the rates at the stages that count in a sum.
-#[inline(always)]
-fn parts<W: Weights>(k: &[Vec<f64>], blocks: usize) -> Parts<'_> {
-    let counts = |stage: usize| stage < W::WEIGHTS.len() && W::WEIGHTS[stage] != 0.0;
-    std::array::from_fn(|stage| if counts(stage) { &k[stage].as_chunks().0[..blocks] } else { &[][..] })
-}
-
-/// The sums of the stages' rates, of the components of a part.
-#[inline(always)]
-fn weigh<W: Weights>(k: &Parts<'_>, block: usize) -> [f64; PART] {
-    let mut sums = [0.0; PART];
-    for (weight, k) in W::WEIGHTS.iter().zip(k) {
-        if *weight != 0.0 {
-            for (sum, k) in sums.iter_mut().zip(&k[block]) {
-                *sum += weight * k;
-            }
-        }
-    }
-    sums
-}
-
-/// The sum of one component's rates at the stages with these weights.
-#[inline(always)]
-fn weighed<W: Weights>(k: &[Vec<f64>], component: usize) -> f64 {
-    let mut sum = 0.0;
-    let k = &k[..W::WEIGHTS.len()];
-    for (weight, k) in W::WEIGHTS.iter().zip(k) {
-        if *weight != 0.0 {
-            sum += weight * k[component];
-        }
-    }
-    sum
-}
-
 impl Workspace {
     /// Tries a step of a pair from a state whose rates are known.
     fn attempt_pair<P: Pair>(&mut self, system: &mut impl Rates, step: Step<'_>, tolerance: f64) -> Trial {
@@ -240,7 +183,7 @@ impl Workspace {
                 self.end.copy_from_slice(&self.stage[..n]);
             }
         }
-        let (mut error, rounding) = self.error::<P>(n, h, tolerance);
+        let (mut error, rounding) = self.largest_error::<P>(n, h, tolerance);
         if system.is_algebraic() {
             let errors: Vec<f64> = (0..y.len()).map(|j| self.estimate::<P>(h, j)).collect();
             error = error.max(system.algebraic_error(h, &self.end, &errors, tolerance));
@@ -248,125 +191,13 @@ impl Workspace {
         self.outcome(error, rounding, tableau.stages - 1)
     }
 
-    /// The state at which the rates of a stage are taken.
-    fn combine_for<P: Pair>(&mut self, stage: usize, n: usize, h: f64) {
-        match stage {
-            1 => self.combine::<StageOf<P, 1>>(n, h),
-            2 => self.combine::<StageOf<P, 2>>(n, h),
-            3 => self.combine::<StageOf<P, 3>>(n, h),
-            4 => self.combine::<StageOf<P, 4>>(n, h),
-            5 => self.combine::<StageOf<P, 5>>(n, h),
-            6 => self.combine::<StageOf<P, 6>>(n, h),
-            7 => self.combine::<StageOf<P, 7>>(n, h),
-            8 => self.combine::<StageOf<P, 8>>(n, h),
-            9 => self.combine::<StageOf<P, 9>>(n, h),
-            10 => self.combine::<StageOf<P, 10>>(n, h),
-            11 => self.combine::<StageOf<P, 11>>(n, h),
-            12 => self.combine::<StageOf<P, 12>>(n, h),
-            13 => self.combine::<StageOf<P, 13>>(n, h),
-            14 => self.combine::<StageOf<P, 14>>(n, h),
-            15 => self.combine::<StageOf<P, 15>>(n, h),
-            _ => unreachable!("there are {MAX_STAGES} stages at most, and the first needs no state"),
-        }
-    }
-
-    /// The state at which a stage's rate is taken, given its weights.
-    fn combine<W: Weights>(&mut self, n: usize, h: f64) {
-        let Workspace { from, stage, k, .. } = self;
-        if n <= FEW {
-            for j in 0..n {
-                stage[j] = from[j] + h * weighed::<W>(k, j);
-            }
-            return;
-        }
-        let (from, stage) = (from.as_chunks::<PART>().0, stage.as_chunks_mut::<PART>().0);
-        let k = parts::<W>(k, from.len());
-        for (block, (from, stage)) in from.iter().zip(stage).enumerate() {
-            let sums = weigh::<W>(&k, block);
-            for i in 0..PART {
-                stage[i] = from[i] + h * sums[i];
-            }
-        }
-    }
-
     /// An estimate of the step times the largest rate of decay: two states at the end of the step and the
     /// difference of their rates (Hairer and Wanner 1996, IV.2).
     fn stiffness(&self, tableau: &Tableau, h: f64) -> f64 {
         let [a, b] = [1, 2].map(|before| &self.k[tableau.stages - before][..self.end.len()]);
-        let square = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - y) * (x - y)).sum::<f64>();
+        let square = |x: &[f64], y: &[f64]| columns::distance(x, y);
         let distance = square(&self.end, &self.other_end);
         if distance > 0.0 { h * (square(a, b) / distance).sqrt() } else { 0.0 }
-    }
-
-    /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
-    fn error<P: Pair>(&mut self, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
-        let (mut error, mut rounding): (f64, f64) = (0.0, 0.0);
-        let blur = 4.0 * self.resolution / P::TABLEAU.c[1];
-        // The last stage is the end of the step.
-        let (from, end) = (self.from.as_chunks::<PART>().0, self.stage.as_chunks::<PART>().0);
-        let high = parts::<EstimateOf<P, 0>>(&self.k, from.len());
-        let low = parts::<EstimateOf<P, 1>>(&self.k, from.len());
-        for (block, (from, end)) in from.iter().zip(end).enumerate() {
-            let first = block * PART;
-            let mut estimate = self.estimates::<EstimateOf<P, 0>>(&high, n, block);
-            if P::TABLEAU.e.len() > 1 {
-                for (high, low) in estimate.iter_mut().zip(self.estimates::<EstimateOf<P, 1>>(&low, n, block))
-                {
-                    *high = join_estimates(h * *high, h * low);
-                }
-            } else {
-                estimate = estimate.map(|high| (h * high).abs());
-            }
-            let (departure, second) = (part(&self.k[0], first), part(&self.k[1], first));
-            let (mut ratios, mut roundings) = ([0.0; PART], [0.0; PART]);
-            let mut noise = [0.0; PART];
-            for (noise, known) in noise.iter_mut().zip(self.noise.iter().skip(first)) {
-                *noise = *known;
-            }
-            let mut size = from.map(f64::abs);
-            for (size, is_sum) in size.iter_mut().zip(self.is_sum.iter().skip(first)) {
-                *size *= if *is_sum { part_of_sum(tolerance) } else { 1.0 };
-            }
-            for j in 0..PART {
-                // Relative to where the step begins, and to how far it goes from there at first: what
-                // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
-                // event, equations may lead anywhere, and that must not spoil the part that counts.
-                // What begins from rest goes somewhere only after that: the second stage shows it.
-                let speed = departure[j].abs().max(second[j].abs());
-                // Rates that depend on time are known as well as time is.
-                let blur = blur * (second[j] - departure[j]).abs();
-                let blur = blur + 4.0 * h.abs() * noise[j];
-                let scale = tolerance * (size[j].max(h.abs() * speed) + FLOOR) + blur;
-                roundings[j] = 4.0 * f64::EPSILON * end[j].abs() / scale;
-                ratios[j] = estimate[j] / scale;
-            }
-            for (ratio, other) in ratios.into_iter().zip(roundings).take(n - first) {
-                rounding = rounding.max(other);
-                error = if ratio > error || ratio.is_nan() { ratio } else { error };
-            }
-        }
-        (error, rounding)
-    }
-
-    /// The estimates of a part of `n` components.
-    #[inline(always)]
-    fn estimates<W: Weights>(&self, k: &Parts<'_>, n: usize, block: usize) -> [f64; PART] {
-        match n {
-            0..=FEW => std::array::from_fn(|j| if j < n { weighed::<W>(&self.k, j) } else { 0.0 }),
-            _ => weigh::<W>(k, block),
-        }
-    }
-
-    /// The estimated error of one component at the end of the step, with its sign.
-    fn estimate<P: Pair>(&self, h: f64, component: usize) -> f64 {
-        let high = h * weighed::<EstimateOf<P, 0>>(&self.k, component);
-        match P::TABLEAU.e.len() {
-            1 => high,
-            _ => {
-                let low = h * weighed::<EstimateOf<P, 1>>(&self.k, component);
-                join_estimates(high, low).copysign(high)
-            }
-        }
     }
 }
 

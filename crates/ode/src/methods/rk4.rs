@@ -25,7 +25,7 @@ impl OneStep for Rk4 {
     fn attempt(&mut self, work: &mut Workspace, system: &mut impl Rates, step: Step<'_>, _: f64) -> Trial {
         let Step { y, h, .. } = step;
         for (i, c) in [(1, 0.5), (2, 0.5), (3, 1.0)] {
-            for (s, (y, k)) in work.stage.iter_mut().zip(y.iter().zip(&work.k[i - 1])) {
+            for (s, (y, k)) in work.stage.iter_mut().zip(y.iter().zip(work.k[i - 1].iter())) {
                 *s = y + h * c * k;
             }
             work.evaluate(system, c * h, i);

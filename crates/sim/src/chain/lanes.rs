@@ -101,7 +101,7 @@ fn has_sign(sign: Sign, [a, b]: [&Lanes; 2], scale: &Lanes, is_like: &mut [bool;
 impl Block {
     /// The registers of the variables of a rule.
     pub fn make_variables(&mut self, rule: &Rule) {
-        self.registers.resize(self.registers.len().max(rule.variables), [0.0; LANES]);
+        self.registers.resize(self.registers.len().max(rule.variables), Lanes::default());
     }
 
     /// The lives of newborns whose parameters are in the registers. `label` is their class, if it is known.
@@ -219,9 +219,9 @@ impl Block {
     /// Finds a class with the signs of each newborn; none if there is none, or they end at birth.
     fn classify(&mut self, lives: &Lives, rule: &Rule) {
         let sides: SmallVec<[usize; 8]> = rule.sides.eval_rows(&mut self.registers, self.count).collect();
-        let mut scale = [1.0f64; LANES];
+        let mut scale = Lanes::all(1.0);
         for own in &self.registers[..rule.parameters.len()] {
-            scale = std::array::from_fn(|lane| scale[lane].max(own[lane].abs()));
+            scale = Lanes(std::array::from_fn(|lane| scale[lane].max(own[lane].abs())));
         }
         let mut open = [true; LANES];
         for &label in lives.labels_of(rule.index) {
@@ -247,7 +247,7 @@ impl Block {
     fn evaluate(&mut self, rule: &Rule, solve: Option<usize>) {
         let clause = solve.map(|solve| &rule.solves[solve]);
         let laws = clause.map_or(&[][..], |clause| &clause.solution_forms);
-        self.coefficients.resize(self.coefficients.len().max(laws.len()), [[0.0; LANES]; 4]);
+        self.coefficients.resize(self.coefficients.len().max(laws.len()), [Lanes::default(); 4]);
         for (law, out) in laws.iter().zip(&mut self.coefficients) {
             let (SolutionForm::Polynomial(program) | SolutionForm::Quadratic(program)) = law else {
                 continue;
@@ -257,7 +257,7 @@ impl Block {
             }
         }
         let watches = rule.zero_crossings(solve);
-        self.levels.resize(self.levels.len().max(watches.len()), [0.0; LANES]);
+        self.levels.resize(self.levels.len().max(watches.len()), Lanes::default());
         for (watch, out) in watches.iter().zip(&mut self.levels) {
             if let ZeroCrossing::Formula { level, .. } = watch
                 && let Some(register) = level.eval_rows(&mut self.registers, self.count).next()
@@ -409,14 +409,15 @@ impl Block {
     /// Makes `t` and `age` those of the births.
     fn put_births(&mut self, rule: &Rule) {
         let time = rule.time_variable();
-        self.registers[time] = std::array::from_fn(|lane| self.births.get(lane).map_or(0.0, |b| b.to_f64()));
-        self.registers[time + 1] = [0.0; LANES];
+        self.registers[time] =
+            Lanes(std::array::from_fn(|lane| self.births.get(lane).map_or(0.0, |b| b.to_f64())));
+        self.registers[time + 1] = Lanes::default();
     }
 
     /// The largest difference between the sides of some atoms, of each module.
     pub fn residuals(&mut self, rule: &Rule, atoms: &[usize]) -> Lanes {
         let sides: SmallVec<[usize; 8]> = rule.sides.eval_rows(&mut self.registers, self.count).collect();
-        let mut residuals = [0.0f64; LANES];
+        let mut residuals = Lanes::default();
         for &atom in atoms {
             let (a, b) = (self.registers[sides[2 * atom]], self.registers[sides[2 * atom + 1]]);
             for (lane, residual) in residuals.iter_mut().enumerate() {
@@ -443,7 +444,7 @@ mod tests {
             for scale in [1.0, 3e9] {
                 for sign in [Sign::Plus, Sign::Minus, Sign::Zero, Sign::Any, Sign::Undefined] {
                     let mut found = [true; LANES];
-                    has_sign(sign, [&[a; LANES], &[b; LANES]], &[scale; LANES], &mut found);
+                    has_sign(sign, [&Lanes::all(a), &Lanes::all(b)], &Lanes::all(scale), &mut found);
                     let expected = is_clear(a, b, scale) && sign_at_birth(a, b) == sign;
                     assert_eq!(found, [expected; LANES], "{a} {b} {scale} {sign:?}");
                 }

@@ -244,7 +244,7 @@ impl<'a, 'm> Planner<'a, 'm> {
         let end = crowd.load(first, rule.parameters.len(), block);
         let walkers = &crowd.walkers[first..end];
         block.end(law, walkers.iter().map(|walker| (walker.at, walker.level)));
-        let residuals = if logs { block.residuals(rule, &law.at_boundary) } else { [0.0; LANES] };
+        let residuals = if logs { block.residuals(rule, &law.at_boundary) } else { Lanes::default() };
         arguments.clear();
         for register in law.stretch.arguments.eval_rows(&mut block.registers, block.count) {
             arguments.push(block.registers[register]);

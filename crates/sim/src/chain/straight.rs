@@ -27,7 +27,7 @@ impl Default for Firsts {
             general: [false; LANES],
             atom: [NEVER; LANES],
             at: [SimTime::ZERO; LANES],
-            level: [0.0; LANES],
+            level: Lanes::default(),
         }
     }
 }
@@ -70,7 +70,7 @@ impl Firsts {
         self.atom = [NEVER; LANES];
         let laws = clause.map_or(0, |clause| clause.solution_forms.len());
         for [rates, ..] in &coefficients[..laws] {
-            for (general, rate) in self.general.iter_mut().zip(rates) {
+            for (general, rate) in self.general.iter_mut().zip(rates.iter()) {
                 *general |= !rate.is_finite();
             }
         }

@@ -106,10 +106,10 @@ impl Simulation<'_> {
         let shown = arity - rule.hidden;
         let values = self.world.tree.values();
         let mut bad = usize::MAX;
-        let mut tau = [0.0; LANES];
+        let mut tau = Lanes::default();
         let mut begin = 0;
         for rows in column.rows.chunks(LANES) {
-            registers.resize(registers.len().max(time + 2), [0.0; LANES]);
+            registers.resize(registers.len().max(time + 2), Lanes::default());
             for (lane, row) in rows.iter().enumerate() {
                 tau[lane] = now.since(row.birth).max(0.0);
                 for (i, x) in values[row.from as usize..row.from as usize + arity].iter().enumerate() {
@@ -117,7 +117,7 @@ impl Simulation<'_> {
                 }
                 registers[time][lane] = row.birth.to_f64();
             }
-            registers[time + 1] = [0.0; LANES];
+            registers[time + 1] = Lanes::default();
             for (law, &parameter) in clause.solution_forms.iter().zip(&clause.of) {
                 if parameter >= shown {
                     continue;
@@ -127,7 +127,7 @@ impl Simulation<'_> {
                     SolutionForm::Polynomial(program) if again && is_zero(program) => continue,
                     SolutionForm::Polynomial(program) => polynomial(program, registers, parameter, &tau),
                     SolutionForm::Quadratic(program) => {
-                        let mut c = [[0.0; LANES]; 3];
+                        let mut c = [Lanes::default(); 3];
                         for (power, register) in program.eval_lanes(registers).enumerate() {
                             c[power] = registers[register];
                         }
@@ -141,7 +141,7 @@ impl Simulation<'_> {
                     SolutionForm::Sum { .. } | SolutionForm::Numeric(_) => continue,
                 };
                 let mut from = begin;
-                for (row, &x) in rows.iter().zip(&moved) {
+                for (row, &x) in rows.iter().zip(moved.iter()) {
                     let twins = &column.places[from..row.end as usize];
                     from = row.end as usize;
                     for &to in twins {
@@ -188,7 +188,7 @@ fn driven(
     tau: &Lanes,
     count: usize,
 ) -> Lanes {
-    let mut c = [[0.0; LANES]; 3];
+    let mut c = [Lanes::default(); 3];
     for (i, register) in law.coefficients.eval_lanes(registers).enumerate() {
         c[i] = registers[register];
     }
@@ -196,16 +196,16 @@ fn driven(
     if let Some(pace) = &law.pace {
         let whole = |registers: &mut Vec<Lanes>| -> Lanes {
             let place = pace.eval_lanes(registers).next();
-            place.map_or([f64::NAN; LANES], |place| registers[place])
+            place.map_or(Lanes::all(f64::NAN), |place| registers[place])
         };
         let before = whole(registers);
         let births = [registers[time], registers[time + 1]];
         for k in 0..2 {
-            registers[time + k] = std::array::from_fn(|i| births[k][i] + tau[i]);
+            registers[time + k] = Lanes(std::array::from_fn(|i| births[k][i] + tau[i]));
         }
         let after = whole(registers);
         (registers[time], registers[time + 1]) = (births[0], births[1]);
-        s = std::array::from_fn(|i| after[i] - before[i]);
+        s = Lanes(std::array::from_fn(|i| after[i] - before[i]));
     }
     let mut moved = registers[parameter];
     for (i, x) in moved.iter_mut().enumerate().take(count) {
@@ -217,18 +217,18 @@ fn driven(
 
 /// A parameter with a polynomial rate at the time `tau` after birth, for each lane: as `Trajectory::value` has it.
 fn polynomial(program: &Program, registers: &mut Vec<Lanes>, parameter: usize, tau: &Lanes) -> Lanes {
-    let mut c = [[0.0; LANES]; 4];
+    let mut c = [Lanes::default(); 4];
     for (power, register) in program.eval_lanes(registers).enumerate() {
         c[power] = registers[register];
     }
     let starts = &registers[parameter];
     if program.outputs() == 1 {
         // The higher coefficients are zero.
-        return std::array::from_fn(|i| starts[i] + tau[i] * (c[0][i] + tau[i] * 0.0));
+        return Lanes(std::array::from_fn(|i| starts[i] + tau[i] * (c[0][i] + tau[i] * 0.0)));
     }
-    std::array::from_fn(|i| {
+    Lanes(std::array::from_fn(|i| {
         let tau = tau[i];
         let c = [c[0][i], c[1][i] / 2.0, c[2][i] / 3.0, c[3][i] / 4.0];
         starts[i] + tau * (c[0] + tau * (c[1] + tau * (c[2] + tau * c[3])))
-    })
+    }))
 }

@@ -197,7 +197,7 @@ impl OneStep for Radau {
                 (work.stage[component], *slope) = (value, rate);
             }
             work.evaluate(system, place * dense.h, 1);
-            let rates = slopes.iter().zip(&work.k[1]);
+            let rates = slopes.iter().zip(work.k[1].iter());
             let mut errors: Vec<f64> = rates.map(|(slope, rate)| dense.h * rate - slope).collect();
             work.rough.iter().for_each(|component| errors[*component as usize] = 0.0);
             stages.settle(pattern, &mut errors);

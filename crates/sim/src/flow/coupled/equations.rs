@@ -6,7 +6,7 @@ use crate::flow::coupled::lanes::EvaluationPoint;
 use crate::flow::coupled::rows::VariableSource;
 use crate::flow::coupled::system::System;
 use crate::world::coupled_solution::CoupledSolution;
-use dlsys_expr::{LANES, Lanes, Scratch};
+use dlsys_expr::{Lanes, Scratch};
 use dlsys_model::Rule;
 use dlsys_ode::Rates;
 
@@ -125,7 +125,7 @@ impl Equations<'_> {
         let aggregate = &rule.aggregates[aggregate];
         let width = aggregate.pattern.width;
         let mut registers = std::mem::take(&mut self.memory.registers);
-        registers.resize(registers.len().max(rule.variables + width), [0.0; LANES]);
+        registers.resize(registers.len().max(rule.variables + width), Lanes::default());
         for &v in aggregate.term.reads() {
             for (lane, &(number, child)) in registers[v].iter_mut().zip(lanes) {
                 let sum = &table.aggregates[number as usize];

@@ -5,6 +5,7 @@
 use crate::flow::coupled::rows::{EquationRow, EquationTable, VariableSource};
 use dlsys_expr::{LANES, Lanes, Program};
 use dlsys_model::Rule;
+use dlsys_wide::Kernel;
 use smallvec::SmallVec;
 use std::ops::Range;
 
@@ -263,31 +264,20 @@ impl LaneBatches {
         registers: &mut Vec<Lanes>,
         out: &mut [f64],
     ) {
-        for chunk in &self.chunks {
-            let program = chunk.key.program(rules);
-            if registers.len() < chunk.registers {
-                registers.resize(chunk.registers, [0.0; LANES]);
-            }
-            for (variable, column) in &self.columns[chunk.first_column..chunk.first_column + chunk.columns] {
-                let register = &mut registers[*variable as usize][..chunk.rows];
-                self.gather(table, *column, point, register);
-            }
-            for (output, register) in program.eval_rows(registers, chunk.rows).enumerate() {
-                let rates = &registers[register][..chunk.rows];
-                match chunk.rates {
-                    LanePlaces::Run(first) => out[first + output..][..chunk.rows].copy_from_slice(rates),
-                    LanePlaces::Any(first) => {
-                        for (rate, place) in rates.iter().zip(&self.places[first..]) {
-                            out[*place as usize + output] = *rate;
-                        }
-                    }
-                }
-            }
-        }
+        dlsys_wide::run(RatesOf { batches: self, table, rules, point, registers, out });
     }
 
     /// Fills a register with one variable of some rows.
-    fn gather(&self, table: &EquationTable, column: LaneColumn, point: &EvaluationPoint, to: &mut [f64]) {
+    #[inline(always)]
+    fn gather(
+        &self,
+        table: &EquationTable,
+        column: LaneColumn,
+        point: &EvaluationPoint,
+        register: &mut Lanes,
+        rows: usize,
+    ) {
+        let to = &mut register[..rows];
         let pick = |from: &[f64], first: usize, to: &mut [f64]| {
             let places = &self.places[first..first + to.len()];
             for (lane, place) in to.iter_mut().zip(places) {
@@ -302,10 +292,8 @@ impl LaneBatches {
                     *lane = table.rows[*row as usize].age + tau;
                 }
             }
-            LaneColumn::Fixed(first) => to.copy_from_slice(&self.numbers[first..first + to.len()]),
-            LaneColumn::State(LanePlaces::Run(first)) => {
-                to.copy_from_slice(&point.y[first..first + to.len()])
-            }
+            LaneColumn::Fixed(first) => copy(&self.numbers[first..], &mut register[..], rows),
+            LaneColumn::State(LanePlaces::Run(first)) => copy(&point.y[first..], &mut register[..], rows),
             LaneColumn::State(LanePlaces::Any(first)) => pick(point.y, first, to),
             LaneColumn::Known(first) => pick(point.known, first, to),
             LaneColumn::RowAggregate(first) => pick(point.aggregates, first, to),
@@ -314,6 +302,55 @@ impl LaneBatches {
                 pick(if point.known.is_empty() { point.y } else { point.known }, first, to);
                 for (lane, source) in &self.others[from..end] {
                     to[*lane as usize] = table.value(*source, tau, point.y, point.inputs);
+                }
+            }
+        }
+    }
+}
+
+/// Copies the values of so many rows; of all of them with few instructions, because their number is known when this is compiled.
+#[inline(always)]
+fn copy(from: &[f64], to: &mut [f64], rows: usize) {
+    match (rows, from.first_chunk::<LANES>(), to.first_chunk_mut::<LANES>()) {
+        (LANES, Some(from), Some(to)) => *to = *from,
+        _ => to[..rows].copy_from_slice(&from[..rows]),
+    }
+}
+
+/// The rates of all rows, with the widest registers of the processor.
+struct RatesOf<'r> {
+    batches: &'r LaneBatches,
+    table: &'r EquationTable,
+    rules: &'r [Rule],
+    point: &'r EvaluationPoint<'r>,
+    registers: &'r mut Vec<Lanes>,
+    out: &'r mut [f64],
+}
+
+impl Kernel for RatesOf<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let RatesOf { batches, table, rules, point, registers, out } = self;
+        for chunk in &batches.chunks {
+            let program = chunk.key.program(rules);
+            if registers.len() < chunk.registers {
+                registers.resize(chunk.registers, Lanes::default());
+            }
+            let columns = &batches.columns[chunk.first_column..chunk.first_column + chunk.columns];
+            for (variable, column) in columns {
+                batches.gather(table, *column, point, &mut registers[*variable as usize], chunk.rows);
+            }
+            for (output, register) in program.eval_rows_inside(registers, chunk.rows).enumerate() {
+                let rates = &registers[register][..];
+                match chunk.rates {
+                    LanePlaces::Run(first) => copy(rates, &mut out[first + output..], chunk.rows),
+                    LanePlaces::Any(first) => {
+                        for (rate, place) in rates[..chunk.rows].iter().zip(&batches.places[first..]) {
+                            out[*place as usize + output] = *rate;
+                        }
+                    }
                 }
             }
         }

@@ -104,13 +104,13 @@ impl FlowStage<'_, '_> {
             && !self.setup.settings.is_sliced()
             && !self.searches_coupled();
         let is_explicit = !self.setup.settings.method.is_implicit() && !self.flows.coupled.control.stiff;
-        self.write_equations(at, without_steps || !is_explicit);
+        let is_linear = without_steps && self.flows.coupled.members.iter().all(|id| self.is_linear(*id));
+        self.write_equations(at, is_linear || !is_explicit);
         let Coupled { system, y, integrator, linear, tried, pulsing, .. } = &mut self.flows.coupled;
         let rules = &self.setup.model.rules;
         *tried = without_steps;
-        *linear = (without_steps)
-            .then(|| Linear::new(system, rules, y, self.setup.coupled_settings.tolerance))
-            .flatten();
+        *linear =
+            is_linear.then(|| Linear::new(system, rules, y, self.setup.coupled_settings.tolerance)).flatten();
         // After each step all members are searched.
         let is_unwatched =
             rules.iter().all(|rule| rule.atoms.is_empty()) && pulsing.is_empty() && system.algebra.is_empty();
@@ -122,6 +122,13 @@ impl FlowStage<'_, '_> {
             }
             integrator.restart(self.setup.settings.method, y.len());
         }
+    }
+
+    /// True if all integrated parameters of a coupled module have linear equations with constant coefficients.
+    fn is_linear(&self, id: ModuleId) -> bool {
+        let Some(state) = self.world.state(id) else { return true };
+        let Some((rule, solve)) = state.rule.zip(state.solve) else { return true };
+        self.setup.model.rules[rule].solves[solve].linear.is_some()
     }
 
     /// Writes the equations of the members from an instant on: as columns only, where that is enough.

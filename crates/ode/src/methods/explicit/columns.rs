@@ -1,0 +1,452 @@
+//! What a step of a pair does with all components side by side: sums of the rates at its stages, and the largest error.
+//!
+//! Loops run along the columns, with all stages of a sum in their body, because that is what a compiler makes wide registers of; they are built for
+//! several widths ([`dlsys_wide`]). Every component is summed in the same order, alone or beside others.
+
+use super::super::dop853::join_estimates;
+use super::Pair;
+use crate::column::Column;
+use crate::workspace::{FLOOR, MAX_STAGES, Workspace, part_of_sum};
+use dlsys_wide::Kernel;
+use std::marker::PhantomData;
+
+/// So few components are summed one by one.
+const FEW: usize = 2;
+
+/// Components whose errors are judged at a time: what is in between stays in the nearest cache.
+const TILE: usize = 64;
+
+/// Fewer components do not gain from wide registers: what is left over of whole registers takes longer than is won.
+const NARROW: usize = 32;
+
+/// Components whose dense output is computed side by side.
+const MANY: usize = 8;
+
+/// The weights of a sum over stages. They are known when this is compiled, so that zeros cost nothing and no loop is left.
+trait Weights {
+    const WEIGHTS: &'static [f64];
+}
+
+/// The weights of the state at which stage `I` is evaluated.
+struct StageOf<P, const I: usize>(PhantomData<P>);
+
+/// The weights of error estimate `I`.
+struct EstimateOf<P, const I: usize>(PhantomData<P>);
+
+impl<P: Pair, const I: usize> Weights for StageOf<P, I> {
+    const WEIGHTS: &'static [f64] = row(P::TABLEAU.a, I);
+}
+
+impl<P: Pair, const I: usize> Weights for EstimateOf<P, I> {
+    const WEIGHTS: &'static [f64] = row(P::TABLEAU.e, I);
+}
+
+/// A row of a table; empty beyond its end.
+const fn row(table: &'static [&'static [f64]], i: usize) -> &'static [f64] {
+    if i < table.len() { table[i] } else { &[] }
+}
+
+/// The sum of one component's rates at the stages with these weights.
+#[inline(always)]
+fn weighed<W: Weights>(k: &[Column], component: usize) -> f64 {
+    let mut sum = 0.0;
+    let k = &k[..W::WEIGHTS.len()];
+    for (weight, k) in W::WEIGHTS.iter().zip(k) {
+        if *weight != 0.0 {
+            sum += weight * k.at(component);
+        }
+    }
+    sum
+}
+
+/// What is made of the sums of the components from `first` on.
+#[inline(always)]
+fn weigh<W: Weights>(k: &[Column], first: usize, out: &mut [f64], made: impl Fn(usize, f64) -> f64) {
+    let n = out.len();
+    let stages: &[Column; MAX_STAGES] = k.first_chunk().expect("all stages");
+    let mut k = [&[][..]; MAX_STAGES];
+    for (k, (stage, weight)) in k.iter_mut().zip(stages.iter().zip(W::WEIGHTS)) {
+        if *weight != 0.0 {
+            *k = &stage[first..first + n];
+        }
+    }
+    for (i, out) in out.iter_mut().enumerate() {
+        let mut sum = 0.0;
+        for (weight, k) in W::WEIGHTS.iter().zip(&k) {
+            if *weight != 0.0 {
+                sum += weight * k[i];
+            }
+        }
+        *out = made(i, sum);
+    }
+}
+
+/// The square of the distance of two states, summed in several parts side by side.
+pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
+    const PARTS: usize = 8;
+    let (whole, rest) = a.as_chunks::<PARTS>();
+    let (others, other_rest) = b.as_chunks::<PARTS>();
+    let mut sums = [0.0; PARTS];
+    for (a, b) in whole.iter().zip(others) {
+        for i in 0..PARTS {
+            sums[i] += (a[i] - b[i]) * (a[i] - b[i]);
+        }
+    }
+    let rest = rest.iter().zip(other_rest).map(|(a, b)| (a - b) * (a - b));
+    sums.iter().sum::<f64>() + rest.sum::<f64>()
+}
+
+/// The state at which a stage's rate is taken.
+struct Combination<'w, W> {
+    from: &'w [f64],
+    k: &'w [Column],
+    stage: &'w mut [f64],
+    h: f64,
+    weights: PhantomData<W>,
+}
+
+impl<W: Weights> Kernel for Combination<'_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let from = &self.from[..self.stage.len()];
+        weigh::<W>(self.k, 0, self.stage, |i, sum| from[i] + self.h * sum);
+    }
+}
+
+/// The largest errors in a step, in units of what is tolerated: by truncation and by rounding.
+struct LargestError<'w, P> {
+    work: &'w Workspace,
+    n: usize,
+    scale: Scale,
+    pair: PhantomData<P>,
+}
+
+/// What the error of a component is compared with.
+#[derive(Clone, Copy)]
+struct Scale {
+    h: f64,
+    tolerance: f64,
+    /// The error of a change of the rates, because time is known no better.
+    blur: f64,
+}
+
+/// What is known of a component: its values at the start and the end, its rates there and at the second stage, the part of its value that counts
+/// and the error of its rate by rounding of the state.
+struct Known {
+    from: f64,
+    end: f64,
+    departure: f64,
+    second: f64,
+    part: f64,
+    noise: f64,
+}
+
+impl Scale {
+    /// The errors of a component by truncation and by rounding, given the estimate of the former.
+    #[inline(always)]
+    fn errors(self, estimate: f64, known: Known) -> (f64, f64) {
+        let Known { from, end, departure, second, part, noise } = known;
+        // Relative to where the step begins, and to how far it goes from there at first: what
+        // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
+        // event, equations may lead anywhere, and that must not spoil the part that counts.
+        // What begins from rest goes somewhere only after that: the second stage shows it.
+        let speed = departure.abs().max(second.abs());
+        // Rates that depend on time are known as well as time is.
+        let blur = self.blur * (second - departure).abs();
+        let blur = blur + 4.0 * self.h.abs() * noise;
+        let scale = self.tolerance * ((from.abs() * part).max(self.h.abs() * speed) + FLOOR) + blur;
+        (estimate / scale, 4.0 * f64::EPSILON * end.abs() / scale)
+    }
+}
+
+/// The larger of two errors; NaN if one is NaN. Numbers that are not negative have the order of their bits, which wide registers compare sooner.
+#[inline(always)]
+fn worse(a: u64, error: f64) -> u64 {
+    a.max(error.to_bits() & !SIGN)
+}
+
+const SIGN: u64 = 1 << 63;
+
+impl<P: Pair> Kernel for LargestError<'_, P> {
+    type Output = (f64, f64);
+
+    #[inline(always)]
+    fn run(self) -> (f64, f64) {
+        let LargestError { work, n, scale, .. } = self;
+        let (h, k) = (scale.h, &work.k);
+        let part_of_sum = part_of_sum(scale.tolerance);
+        let has_sums = work.is_sum.contains(&true);
+        let (mut worst, mut roundest) = (0, 0);
+        let [mut part, mut noise] = [[1.0; TILE], [0.0; TILE]];
+        let [mut errors, mut low, mut roundings] = [[0.0; TILE]; 3];
+        for first in (0..n).step_by(TILE) {
+            // What is in the padding is computed, too.
+            let tile = first..(first + TILE).min(work.from.len());
+            let len = tile.len();
+            let errors = &mut errors[..len];
+            if P::TABLEAU.e.len() > 1 {
+                weigh::<EstimateOf<P, 0>>(k, first, errors, |_, high| h * high);
+                weigh::<EstimateOf<P, 1>>(k, first, &mut low[..len], |_, low| h * low);
+                for (error, low) in errors.iter_mut().zip(&low) {
+                    *error = join_estimates(*error, *low);
+                }
+            } else {
+                weigh::<EstimateOf<P, 0>>(k, first, errors, |_, high| (h * high).abs());
+            }
+            if has_sums {
+                for (part, is_sum) in part.iter_mut().zip(&work.is_sum[first..]) {
+                    *part = if *is_sum { part_of_sum } else { 1.0 };
+                }
+            }
+            if !work.noise.is_empty() {
+                noise.iter_mut().zip(&work.noise[first..]).for_each(|(noise, known)| *noise = *known);
+            }
+            // The last stage is the end of the step.
+            let (from, end) = (&work.from[tile.clone()], &work.stage[tile.clone()]);
+            let (departure, second) = (&k[0][tile.clone()], &k[1][tile]);
+            let (part, noise, roundings) = (&part[..len], &noise[..len], &mut roundings[..len]);
+            for i in 0..len {
+                let known = Known {
+                    from: from[i],
+                    end: end[i],
+                    departure: departure[i],
+                    second: second[i],
+                    part: part[i],
+                    noise: noise[i],
+                };
+                (errors[i], roundings[i]) = scale.errors(errors[i], known);
+            }
+            let there = len.min(n - first);
+            worst = errors[..there].iter().fold(worst, |worst, error| worse(worst, *error));
+            // Where rounding cannot be told, truncation cannot either.
+            let known = roundings[..there].iter().map(|error| if error.is_nan() { 0.0 } else { *error });
+            roundest = known.fold(roundest, worse);
+        }
+        (f64::from_bits(worst), f64::from_bits(roundest))
+    }
+}
+
+/// The dense output of all components.
+struct Polynomials<'w, P> {
+    work: &'w Workspace,
+    y: &'w [f64],
+    h: f64,
+    pair: PhantomData<P>,
+}
+
+impl<P: Pair> Kernel for Polynomials<'_, P> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run(self) -> Vec<f64> {
+        let Polynomials { work, y, h, .. } = self;
+        let (n, mut out) = (y.len(), Vec::with_capacity(y.len() * (P::DEGREE + 1)));
+        let k: &[Column; MAX_STAGES] = work.k.first_chunk().expect("all stages");
+        if n <= FEW {
+            for (j, (y, end)) in y.iter().zip(&work.end).enumerate() {
+                P::dense::<1>(&[*y], &[*end], k, j, h, 1, &mut out);
+            }
+            return out;
+        }
+        for first in (0..n).step_by(MANY) {
+            let count = MANY.min(n - first);
+            let [mut from, mut to] = [[0.0; MANY]; 2];
+            from[..count].copy_from_slice(&y[first..first + count]);
+            to[..count].copy_from_slice(&work.end[first..first + count]);
+            P::dense::<MANY>(&from, &to, k, first, h, count, &mut out);
+        }
+        out
+    }
+}
+
+/// Carries out a loop over so many components.
+#[inline]
+fn run<K: Kernel>(components: usize, kernel: K) -> K::Output {
+    if components <= NARROW { kernel.run() } else { dlsys_wide::run(kernel) }
+}
+
+impl Workspace {
+    /// The dense output of all components, from `y` on, in a step of this length.
+    pub(super) fn polynomials<P: Pair>(&self, y: &[f64], h: f64) -> Vec<f64> {
+        let all = Polynomials::<P> { work: self, y, h, pair: PhantomData };
+        run(y.len(), all)
+    }
+
+    /// The state at which the rates of a stage are taken.
+    pub(super) fn combine_for<P: Pair>(&mut self, stage: usize, n: usize, h: f64) {
+        match stage {
+            1 => self.combine::<StageOf<P, 1>>(n, h),
+            2 => self.combine::<StageOf<P, 2>>(n, h),
+            3 => self.combine::<StageOf<P, 3>>(n, h),
+            4 => self.combine::<StageOf<P, 4>>(n, h),
+            5 => self.combine::<StageOf<P, 5>>(n, h),
+            6 => self.combine::<StageOf<P, 6>>(n, h),
+            7 => self.combine::<StageOf<P, 7>>(n, h),
+            8 => self.combine::<StageOf<P, 8>>(n, h),
+            9 => self.combine::<StageOf<P, 9>>(n, h),
+            10 => self.combine::<StageOf<P, 10>>(n, h),
+            11 => self.combine::<StageOf<P, 11>>(n, h),
+            12 => self.combine::<StageOf<P, 12>>(n, h),
+            13 => self.combine::<StageOf<P, 13>>(n, h),
+            14 => self.combine::<StageOf<P, 14>>(n, h),
+            15 => self.combine::<StageOf<P, 15>>(n, h),
+            _ => unreachable!("there are {MAX_STAGES} stages at most, and the first needs no state"),
+        }
+    }
+
+    /// The state at which a stage's rate is taken, given its weights.
+    fn combine<W: Weights>(&mut self, n: usize, h: f64) {
+        let Workspace { from, stage, k, .. } = self;
+        if n <= FEW {
+            for j in 0..n {
+                stage[j] = from.at(j) + h * weighed::<W>(k, j);
+            }
+            return;
+        }
+        run(n, Combination::<W> { from, k, stage, h, weights: PhantomData });
+    }
+
+    /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
+    pub(super) fn largest_error<P: Pair>(&self, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
+        let scale = Scale { h, tolerance, blur: 4.0 * self.resolution / P::TABLEAU.c[1] };
+        if n > FEW {
+            return run(n, LargestError::<P> { work: self, n, scale, pair: PhantomData });
+        }
+        let (mut worst, mut roundest) = (0, 0.0f64);
+        for j in 0..n {
+            let is_sum = self.is_sum.get(j).is_some_and(|is_sum| *is_sum);
+            let known = Known {
+                from: self.from.at(j),
+                end: self.stage.at(j),
+                departure: self.k[0].at(j),
+                second: self.k[1].at(j),
+                part: if is_sum { part_of_sum(tolerance) } else { 1.0 },
+                noise: self.noise.get(j).copied().unwrap_or(0.0),
+            };
+            let (error, rounding) = scale.errors(self.estimate::<P>(h, j).abs(), known);
+            worst = worse(worst, error);
+            roundest = roundest.max(rounding);
+        }
+        (f64::from_bits(worst), roundest)
+    }
+
+    /// The estimated error of one component at the end of the step, with its sign.
+    pub(super) fn estimate<P: Pair>(&self, h: f64, component: usize) -> f64 {
+        let high = h * weighed::<EstimateOf<P, 0>>(&self.k, component);
+        match P::TABLEAU.e.len() {
+            1 => high,
+            _ => {
+                let low = h * weighed::<EstimateOf<P, 1>>(&self.k, component);
+                join_estimates(high, low).copysign(high)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::methods::dop853::Dop853;
+    use crate::methods::dopri5::Dopri5;
+    use dlsys_wide::Width;
+
+    const H: f64 = 0.3;
+    const TOLERANCE: f64 = 1e-6;
+
+    /// A step of `n` components that differ by orders of magnitude, some of which rest.
+    fn some(n: usize) -> Workspace {
+        let mut seed = n as u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            let x = (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+            x * 10f64.powi((seed >> 7) as i32 % 9)
+        };
+        let mut work = Workspace::default();
+        work.resize(n);
+        for j in 0..n {
+            (work.from[j], work.stage[j], work.end[j]) = (random(), random(), random());
+            let rests = j % 7 == 3;
+            work.k.iter_mut().for_each(|k| k[j] = if rests { 0.0 } else { random() });
+        }
+        work.is_sum = (0..n).map(|j| j % 5 == 1).collect();
+        work.resolution = 1e-12;
+        work
+    }
+
+    /// One component of it.
+    fn alone(work: &Workspace, j: usize) -> Workspace {
+        let mut one = Workspace::default();
+        one.resize(1);
+        (one.from[0], one.stage[0], one.end[0]) = (work.from[j], work.stage[j], work.end[j]);
+        one.k.iter_mut().zip(&work.k).for_each(|(one, k)| one[0] = k[j]);
+        one.is_sum = vec![work.is_sum[j]];
+        one.noise = work.noise.get(j).copied().into_iter().collect();
+        one.resolution = work.resolution;
+        one
+    }
+
+    fn bits(all: &[f64]) -> Vec<u64> {
+        all.iter().map(|x| x.to_bits()).collect()
+    }
+
+    fn check<P: Pair>(mut work: Workspace, n: usize) {
+        let scale = Scale { h: H, tolerance: TOLERANCE, blur: 4.0 * work.resolution / P::TABLEAU.c[1] };
+        let mut each: Vec<Workspace> = (0..n).map(|j| alone(&work, j)).collect();
+        let errors = each.iter().map(|one| one.largest_error::<P>(1, H, TOLERANCE));
+        let largest = errors.fold((0.0f64, 0.0f64), |(a, b), (error, rounding)| {
+            (if error > a || error.is_nan() { error } else { a }, b.max(rounding))
+        });
+        let y = work.from[..n].to_vec();
+        let polynomials: Vec<f64> =
+            each.iter().flat_map(|one| one.polynomials::<P>(&one.from[..1], H)).collect();
+        for width in Width::ALL {
+            let error = LargestError::<P> { work: &work, n, scale, pair: PhantomData };
+            let (error, rounding) = dlsys_wide::run_with(width, error);
+            assert_eq!(bits(&[error, rounding]), bits(&[largest.0, largest.1]), "{n} components, {width:?}");
+            let all = Polynomials::<P> { work: &work, y: &y, h: H, pair: PhantomData };
+            assert_eq!(bits(&dlsys_wide::run_with(width, all)), bits(&polynomials), "{n}, {width:?}");
+        }
+        for stage in 1..P::TABLEAU.a.len() {
+            work.combine_for::<P>(stage, n, H);
+            each.iter_mut().for_each(|one| one.combine_for::<P>(stage, 1, H));
+            let alone: Vec<f64> = each.iter().map(|one| one.stage[0]).collect();
+            assert_eq!(bits(&work.stage[..n]), bits(&alone), "stage {stage} of {n}");
+        }
+        for width in Width::ALL {
+            let Workspace { from, k, stage, .. } = &mut work;
+            let last = Combination::<StageOf<P, 6>> { from, k, stage, h: H, weights: PhantomData };
+            dlsys_wide::run_with(width, last);
+            each.iter_mut().for_each(|one| one.combine_for::<P>(6, 1, H));
+            let alone: Vec<f64> = each.iter().map(|one| one.stage[0]).collect();
+            assert_eq!(bits(&work.stage[..n]), bits(&alone), "{n}, {width:?}");
+        }
+    }
+
+    /// Components side by side are what each is alone, and the largest error is the largest of theirs, however many there are and however
+    /// wide registers are.
+    #[test]
+    fn components_are_what_each_is_alone() {
+        for n in [1, 2, 3, 7, 8, 9, 20, 31, 32, 33, 64, 65, 130] {
+            check::<Dopri5>(some(n), n);
+            check::<Dop853>(some(n), n);
+            let mut noisy = some(n);
+            noisy.noise = (0..n).map(|j| j as f64 * 1e-3).collect();
+            check::<Dop853>(noisy, n);
+        }
+    }
+
+    /// An error that is no number is not lost beside others.
+    #[test]
+    fn what_is_not_a_number_is_found() {
+        for (n, at) in [(1, 0), (9, 8), (70, 3), (70, 69)] {
+            let mut work = some(n);
+            work.k[4][at] = f64::NAN;
+            let (error, _) = work.largest_error::<Dopri5>(n, H, TOLERANCE);
+            assert!(error.is_nan(), "component {at} of {n}: {error}");
+            let (error, _) = { some(n) }.largest_error::<Dopri5>(n, H, TOLERANCE);
+            assert!(error.is_finite(), "{n}: {error}");
+        }
+    }
+}
