@@ -14,6 +14,10 @@ use crate::triangles::Triangles;
 use crate::{Fit, Page, Smoothness, shot};
 use dlsys_geometry::scene::{Color, MaterialId, Palette, Point, Scene, Texture, Vector};
 
+/// Light changes evenly between corners whose normals are at an angle of no more than this cosine: the sharpest part of it, the gloss, has second derivatives
+/// of about four, so it is off by half the square of 8 degrees.
+const LEAST_COS: f64 = 0.99;
+
 /// All of a channel, on a page.
 const FULL: u32 = 65535;
 
@@ -162,9 +166,7 @@ impl<'m> Lit<'m> {
     /// is lit.
     pub(crate) fn strength(&self, n: usize, weights: [f64; 3]) -> f64 {
         let face = &self.mesh.faces[n];
-        let [p, q, r] = face.corners.map(|(vertex, _)| self.places[vertex as usize]);
-        // Pixels go down.
-        let facing = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0;
+        let facing = self.is_facing(n);
         let (mut normal, mut seen) = (Vector::zeros(), Vector::zeros());
         for (k, weight) in weights.into_iter().enumerate() {
             let (vertex, at) = face.corners[k];
@@ -176,6 +178,44 @@ impl<'m> Lit<'m> {
         }
         let normal = normal.try_normalize(1e-12).unwrap_or_else(Vector::z) * if facing { 1.0 } else { -1.0 };
         self.lighting.strength(&Spot { normal, seen: Point::from(seen), is_thin: face.is_thin })
+    }
+
+    /// The numbers of triangles and of normals.
+    pub(crate) fn counts(&self) -> [usize; 2] {
+        [self.mesh.faces.len(), self.normals.len()]
+    }
+
+    /// The strength of light at the corners of a triangle; `None` unless it changes evenly between them, but for a hundredth. What is known `by_normal`, on
+    /// its front and on its back, is not reckoned again.
+    pub(crate) fn at_corners(&self, n: usize, by_normal: &mut [[f64; 2]]) -> Option<[f64; 3]> {
+        let light = self.lighting.lamp()?;
+        let face = &self.mesh.faces[n];
+        let normals = face.corners.map(|(_, at)| self.normals[at as usize]);
+        let is_bent = |a: &Vector, b: &Vector| {
+            let cos = a.dot(b);
+            cos <= 0.0 || cos * cos < LEAST_COS * LEAST_COS * a.norm_squared() * b.norm_squared()
+        };
+        let [p, q, r] = &normals;
+        if self.floor == Some(face.material) || is_bent(p, q) || is_bent(q, r) || is_bent(r, p) {
+            return None;
+        }
+        let side = usize::from(!self.is_facing(n));
+        Some([0, 1, 2].map(|k| {
+            let (vertex, normal) = face.corners[k];
+            let known = &mut by_normal[normal as usize][side];
+            if known.is_nan() {
+                let unit = normals[k].try_normalize(1e-12).unwrap_or_else(Vector::z);
+                *known = light.of_normal(if side == 0 { unit } else { -unit }, face.is_thin);
+            }
+            *known + light.at_depth(self.seen[vertex as usize].z)
+        }))
+    }
+
+    /// Whether a triangle is seen from its front.
+    fn is_facing(&self, n: usize) -> bool {
+        let [p, q, r] = self.mesh.faces[n].corners.map(|(vertex, _)| self.places[vertex as usize]);
+        // Pixels go down.
+        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0
     }
 
     /// The light on the triangles.

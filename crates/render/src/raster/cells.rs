@@ -27,12 +27,14 @@ pub(crate) struct Given<C, D> {
     pub(crate) cut: D,
 }
 
-/// Finds the nearest triangle in the middle of each pixel, in rasters that are empty before. Of two at the same depth it is the later.
+/// Finds the nearest triangle in the middle of each pixel, in rasters that are empty before, and of each row the first column and the one after the last in which
+/// there are any. Of two at the same depth it is the later.
 pub(crate) fn in_middles<'c>(
     [width, height]: [usize; 2],
     triangles: &Given<impl Fn(usize) -> [Place; 3], impl Fn(usize) -> Option<Cut<'c>>>,
     mut nearest: Nearest<1>,
-) -> Nearest<1> {
+) -> (Nearest<1>, Vec<[u32; 2]>) {
+    let mut spans = vec![[u32::MAX, 0]; height];
     for number in 0..triangles.count {
         let corners = (triangles.corners)(number);
         // Most are so small that they lie between the middles.
@@ -43,9 +45,10 @@ pub(crate) fn in_middles<'c>(
         }
         let Some(ready) = Ready::new(corners, width, &(0..height)) else { continue };
         let cut = (triangles.cut)(number);
-        nearest.add_middles(number as u32 + 1, &ready, [columns, rows], width, cut.as_ref());
+        nearest.add_middles(number as u32 + 1, &ready, [columns, rows], (width, &mut spans), cut.as_ref());
     }
-    nearest
+    spans.iter_mut().filter(|[first, _]| *first == u32::MAX).for_each(|span| *span = [0; 2]);
+    (nearest, spans)
 }
 
 /// The pixels whose middles lie between the coordinates of corners, of so many.
@@ -61,7 +64,7 @@ impl Nearest<1> {
         number: u32,
         ready: &Ready,
         [columns, rows]: [Range<usize>; 2],
-        width: usize,
+        (width, spans): (usize, &mut [[u32; 2]]),
         cut: Option<&Cut<'_>>,
     ) {
         let plane = ready.plane;
@@ -71,17 +74,19 @@ impl Nearest<1> {
         for row in rows {
             let mut here = start;
             (0..3).for_each(|k| start[k] += ready.sides[k][2] * STEPS);
-            let mut entered = false;
+            let mut entered = None;
+            let mut last = columns.end;
             for column in columns.clone() {
                 let is_outside = here[0] | here[1] | here[2] < 0;
                 (0..3).for_each(|k| here[k] += ready.sides[k][1] * STEPS);
                 if is_outside {
-                    if entered {
+                    if entered.is_some() {
+                        last = column;
                         break;
                     }
                     continue;
                 }
-                entered = true;
+                entered = entered.or(Some(column));
                 if cut.is_some_and(|cut| !cut.is_drawn([column as f64 + 0.5, row as f64 + 0.5])) {
                     continue;
                 }
@@ -93,6 +98,10 @@ impl Nearest<1> {
                     *behind = if depth > *behind { depth } else { *behind };
                     *held = number;
                 }
+            }
+            if let Some(first) = entered {
+                let [from, end] = &mut spans[row];
+                (*from, *end) = ((*from).min(first as u32), (*end).max(last as u32));
             }
         }
     }
