@@ -14,9 +14,10 @@ use crate::triangles::Triangles;
 use crate::{Fit, Page, Smoothness, shot};
 use dlsys_geometry::scene::{Color, MaterialId, Palette, Point, Scene, Texture, Vector};
 
-/// Light changes evenly between corners whose normals are at an angle of no more than this cosine: the sharpest part of it, the gloss, has second derivatives
-/// of about four, so it is off by half the square of 8 degrees.
-const LEAST_COS: f64 = 0.99;
+/// The least cosines of the angles between corners where the light between them is a linear, and where it is a quadratic function of the place. The sharpest
+/// part of it, the gloss, has second derivatives of about four, so a linear one is off by half the square of the angle, a hundredth.
+const EVEN: f64 = 0.99;
+const BENT: f64 = 0.85;
 
 /// All of a channel, on a page.
 const FULL: u32 = 65535;
@@ -67,6 +68,12 @@ pub(crate) fn picture(
         Smoothness::Fine => shot::draw(&raster::SIXTEEN, threads, &stage, &lens, &lighting),
         Smoothness::Quick => shot::draw(&raster::FOUR, threads, &stage, &lens, &lighting),
     }
+}
+
+/// The strength of light at the corners of a triangle; and half-way from each to the next, if that is not about the mean.
+pub(crate) struct CornerLight {
+    pub(crate) at: [f64; 3],
+    pub(crate) between: Option<[f64; 3]>,
 }
 
 /// Triangles in pixels, and the light on them.
@@ -185,30 +192,42 @@ impl<'m> Lit<'m> {
         [self.mesh.faces.len(), self.normals.len()]
     }
 
-    /// The strength of light at the corners of a triangle; `None` unless it changes evenly between them, but for a hundredth. What is known `by_normal`, on
-    /// its front and on its back, is not reckoned again.
-    pub(crate) fn at_corners(&self, n: usize, by_normal: &mut [[f64; 2]]) -> Option<[f64; 3]> {
+    /// The strength of light at the corners of a triangle, and what is needed to tell it between them; `None` unless they are turned about the same way.
+    /// What is known `by_normal`, on its front and on its back, is not reckoned again.
+    pub(crate) fn at_corners(&self, n: usize, by_normal: &mut [[f64; 2]]) -> Option<CornerLight> {
         let light = self.lighting.lamp()?;
         let face = &self.mesh.faces[n];
+        if self.floor == Some(face.material) {
+            return None;
+        }
         let normals = face.corners.map(|(_, at)| self.normals[at as usize]);
-        let is_bent = |a: &Vector, b: &Vector| {
+        let square = |i: usize, k: usize| {
+            let (a, b) = (&normals[i], &normals[k]);
             let cos = a.dot(b);
-            cos <= 0.0 || cos * cos < LEAST_COS * LEAST_COS * a.norm_squared() * b.norm_squared()
+            if cos > 0.0 { cos * cos / (a.norm_squared() * b.norm_squared()) } else { 0.0 }
         };
-        let [p, q, r] = &normals;
-        if self.floor == Some(face.material) || is_bent(p, q) || is_bent(q, r) || is_bent(r, p) {
+        let least = square(0, 1).min(square(1, 2)).min(square(2, 0));
+        if least.is_nan() || least < BENT * BENT {
             return None;
         }
         let side = usize::from(!self.is_facing(n));
-        Some([0, 1, 2].map(|k| {
-            let (vertex, normal) = face.corners[k];
-            let known = &mut by_normal[normal as usize][side];
+        let lit = |normal: Vector| {
+            let unit = normal.try_normalize(1e-12).unwrap_or_else(Vector::z);
+            light.of_normal(if side == 0 { unit } else { -unit }, face.is_thin)
+        };
+        let depths = face.corners.map(|(vertex, _)| light.at_depth(self.seen[vertex as usize].z));
+        let at = [0, 1, 2].map(|k| {
+            let known = &mut by_normal[face.corners[k].1 as usize][side];
             if known.is_nan() {
-                let unit = normals[k].try_normalize(1e-12).unwrap_or_else(Vector::z);
-                *known = light.of_normal(if side == 0 { unit } else { -unit }, face.is_thin);
+                *known = lit(normals[k]);
             }
-            *known + light.at_depth(self.seen[vertex as usize].z)
-        }))
+            *known + depths[k]
+        });
+        let between = (least < EVEN * EVEN).then(|| {
+            [(0, 1), (1, 2), (2, 0)]
+                .map(|(i, k)| lit(normals[i] + normals[k]) + (depths[i] + depths[k]) / 2.0)
+        });
+        Some(CornerLight { at, between })
     }
 
     /// Whether a triangle is seen from its front.

@@ -71,51 +71,47 @@ impl Nearest<1> {
         let ahead = [(columns.start, ready.columns[0]), (rows.start, ready.rows[0])]
             .map(|(to, from)| STEPS * (to as i64 - from as i64) + HALF);
         let mut start = ready.sides.map(|[value, a, b]| value + a * ahead[0] + b * ahead[1]);
+        let step = ready.sides.map(|side| side[1] * STEPS);
         for row in rows {
             let mut here = start;
             (0..3).for_each(|k| start[k] += ready.sides[k][2] * STEPS);
-            let mut entered = None;
-            let mut last = columns.end;
-            for column in columns.clone() {
-                let is_outside = here[0] | here[1] | here[2] < 0;
-                (0..3).for_each(|k| here[k] += ready.sides[k][1] * STEPS);
-                if is_outside {
-                    if entered.is_some() {
-                        last = column;
-                        break;
-                    }
-                    continue;
-                }
-                entered = entered.or(Some(column));
-                if cut.is_some_and(|cut| !cut.is_drawn([column as f64 + 0.5, row as f64 + 0.5])) {
-                    continue;
-                }
+            let mut first = columns.start;
+            while first < columns.end && here[0] | here[1] | here[2] < 0 {
+                (0..3).for_each(|k| here[k] += step[k]);
+                first += 1;
+            }
+            let line = row * width;
+            let mut column = first;
+            while column < columns.end && here[0] | here[1] | here[2] >= 0 {
+                (0..3).for_each(|k| here[k] += step[k]);
+                let is_cut = cut.is_some_and(|cut| !cut.is_drawn([column as f64 + 0.5, row as f64 + 0.5]));
                 let depth = plane.sample(plane.at([column, row]), [HALF as f32; 2]);
-                let cell = row * width + column;
-                let ([held], [behind]) = (&mut self.numbers[cell], &mut self.depths[cell]);
+                let ([held], [behind]) = (&mut self.numbers[line + column], &mut self.depths[line + column]);
                 // Later ones have greater numbers.
-                if depth + EQUAL >= *behind {
+                if depth + EQUAL >= *behind && !is_cut {
                     *behind = if depth > *behind { depth } else { *behind };
                     *held = number;
                 }
+                column += 1;
             }
-            if let Some(first) = entered {
+            if column > first {
                 let [from, end] = &mut spans[row];
-                (*from, *end) = ((*from).min(first as u32), (*end).max(last as u32));
+                (*from, *end) = ((*from).min(first as u32), (*end).max(column as u32));
             }
         }
     }
 }
 
-/// Finds the nearest triangle at each sample of the pixels that have a `place` below `count`. Of two at the same depth it is the later.
+/// Finds the nearest triangle at each sample of these pixels, the first of which has the `place` 0; others have one beyond all of them. Of two at the same depth it is the later.
 /// Triangles that are known to be `seen` come first, so that most others are hidden by then.
 pub(crate) fn at_samples<'c, const N: usize>(
     pattern: &Pattern<N>,
     size: [usize; 2],
     triangles: &Given<impl Fn(usize) -> [Place; 3], impl Fn(usize) -> Option<Cut<'c>>>,
-    (count, place): (usize, impl Fn(usize) -> usize),
+    (cells, place): (&[u32], impl Fn(usize) -> usize),
     seen: impl Fn(usize) -> bool,
 ) -> Nearest<N> {
+    let count = cells.len();
     let mut nearest = Nearest { numbers: vec![[0; N]; count], depths: vec![[f32::NEG_INFINITY; N]; count] };
     let Given { corners, cut, .. } = triangles;
     for number in (0..triangles.count).filter(|number| seen(*number)) {
@@ -124,10 +120,53 @@ pub(crate) fn at_samples<'c, const N: usize>(
     let farthest = |depths: &[f32; N]| depths.iter().copied().fold(f32::INFINITY, f32::min);
     let far: Vec<f32> = nearest.depths.iter().map(farthest).collect();
     let is_open = |place: usize, depth: f32| far.get(place).is_some_and(|far| depth + EQUAL >= *far);
+    let blocks = Blocks::new(size, cells, &far);
     for number in (0..triangles.count).filter(|number| !seen(*number)) {
-        nearest.add(pattern, size, (number, corners(number), || cut(number)), &place, is_open);
+        let corners = corners(number);
+        if blocks.is_open(&corners) {
+            nearest.add(pattern, size, (number, corners, || cut(number)), &place, is_open);
+        }
     }
     nearest
+}
+
+/// Pixels along a side of a block, as a power of two.
+const BLOCK: u32 = 3;
+
+/// By block of pixels the depth of what is farthest in those that are to be drawn, so that most of what is hidden is passed at once.
+struct Blocks {
+    size: [usize; 2],
+    far: Vec<f32>,
+}
+
+impl Blocks {
+    /// Of these pixels, which have these depths.
+    fn new([width, height]: [usize; 2], cells: &[u32], depths: &[f32]) -> Blocks {
+        let size = [width, height].map(|side| (side >> BLOCK) + 1);
+        let mut far = vec![f32::INFINITY; size[0] * size[1]];
+        for (cell, depth) in cells.iter().zip(depths) {
+            let [column, row] = [*cell as usize % width, *cell as usize / width].map(|at| at >> BLOCK);
+            let known = &mut far[row * size[0] + column];
+            *known = known.min(*depth);
+        }
+        Blocks { size, far }
+    }
+
+    /// Whether a triangle may be in front of something.
+    fn is_open(&self, corners: &[Place; 3]) -> bool {
+        let range = |at: [i32; 3], count: usize| {
+            let block = |at: i32| (i64::from(at).div_euclid(STEPS) >> BLOCK).max(0) as usize;
+            let [low, high] = [at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2])];
+            (block(low).min(count), (block(high) + 1).min(count))
+        };
+        let front = corners[0].depth.max(corners[1].depth).max(corners[2].depth);
+        let columns = range(corners.each_ref().map(|corner| corner.x), self.size[0]);
+        let rows = range(corners.each_ref().map(|corner| corner.y), self.size[1]);
+        (rows.0..rows.1).any(|row| {
+            let line = &self.far[row * self.size[0]..][..self.size[0]];
+            line[columns.0..columns.1].iter().any(|far| front + EQUAL >= *far)
+        })
+    }
 }
 
 impl<const N: usize> Nearest<N> {

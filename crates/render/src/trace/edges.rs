@@ -102,8 +102,7 @@ impl AtEdges<'_> {
         let middles = spans.cells().flat_map(|cells| &numbers[cells]);
         middles.for_each(|[number]| in_front[*number as usize] = true);
         let triangles = Given { count: items.len(), corners: |n| lit.snapped(n), cut: |n| lit.cut(n, N) };
-        let seen =
-            cells::at_samples(pattern, size, &triangles, (self.cells.len(), place), |n| in_front[n + 1]);
+        let seen = cells::at_samples(pattern, size, &triangles, (self.cells, place), |n| in_front[n + 1]);
         let mut samples = Vec::with_capacity(self.cells.len() * N);
         let mut known: Vec<(u32, Sample)> = Vec::with_capacity(N);
         for (cell, numbers) in self.cells.iter().zip(&seen.numbers) {

@@ -156,6 +156,7 @@ pub fn label(
         strengths: empty(&mut rasters.strengths, room, 0.0),
         shades: Vec::new(),
         known: FxHashMap::default(),
+        last: None,
     };
     cells.fill(seen, &item_of, tones, &mut shading);
     let Cells { mut labels, strengths, mut shades, .. } = cells;
@@ -220,6 +221,7 @@ struct Cells {
     strengths: Vec<f32>,
     shades: Vec<Shade>,
     known: FxHashMap<(Item, i32), u32>,
+    last: Option<((Item, i32), u32)>,
 }
 
 impl Cells {
@@ -252,27 +254,39 @@ impl Cells {
         tones: &Tones,
         shading: &mut Shading,
     ) {
-        let mut last = None;
+        let has_shades = item.stem.is_none();
+        let even = if has_shades { shading.even(n) } else { None };
         for column in first..first + count {
-            let cell = row * seen.size[0] + column;
-            let weights = || cells::weights(seen.lit.corners(n), [column, row]);
+            let at = [column, row];
+            let weights = || cells::weights(seen.lit.corners(n), at);
             if let Some(color) = seen.lit.pictured(n, weights) {
                 item.tone = tones.nearest(item.look.1, color);
             }
-            let strength = if item.stem.is_none() { shading.strength(n, [column, row]) } else { 0.0 };
-            let key = (item, item.step(strength));
-            let number = match last {
-                Some((same, number)) if same == key => number,
-                _ => *self.known.entry(key).or_insert_with(|| {
-                    self.shades.push(Shade::new(item, key.1, 0.0, 0));
-                    self.shades.len() as u32 - 1
-                }),
+            let strength = match even {
+                Some(even) => even.at(at),
+                None if has_shades => shading.uneven(n, at),
+                None => 0.0,
             };
-            last = Some((key, number));
+            let number = self.number(item, item.step(strength));
             let shade = &mut self.shades[number as usize];
             (shade.sum, shade.count) = (shade.sum + strength, shade.count + 1);
+            let cell = row * seen.size[0] + column;
             (self.labels[cell], self.strengths[cell]) = (number, strength as f32);
         }
+    }
+
+    /// The number of a shade of an item.
+    fn number(&mut self, item: Item, step: i32) -> u32 {
+        let key = (item, step);
+        if let Some((_, number)) = self.last.filter(|(last, _)| *last == key) {
+            return number;
+        }
+        let number = *self.known.entry(key).or_insert_with(|| {
+            self.shades.push(Shade::new(item, step, 0.0, 0));
+            self.shades.len() as u32 - 1
+        });
+        self.last = Some((key, number));
+        number
     }
 }
 

@@ -1,39 +1,54 @@
 //! The strength of light in cells, triangle by triangle.
 //!
 //! Under the default lamp light depends on the normal and the depth alone. Where the corners of a triangle are turned about the same way, it is taken to change
-//! evenly from one to the other; elsewhere, and in declared light, which casts shadows, it is that in the middle of each cell.
+//! evenly from one to the other, or as a quadratic function of the place that is right half-way between them, too; elsewhere, and in declared light, which casts shadows, it is that in the middle of each cell.
 
-use crate::formats::png::Lit;
+use crate::formats::png::{CornerLight, Lit};
 use crate::raster::Corner;
 use crate::raster::cells::weights;
 
 /// The strength of light between three corners, as a function of a place in cells.
 #[derive(Clone, Copy)]
-struct Even {
+pub struct Even {
     origin: [f64; 2],
-    /// At the origin, and what a cell to the right and one down add.
+    /// The weights of the second and of the third corner: what a cell to the right and one down add.
+    weights: [[f64; 2]; 2],
+    /// At the first corner, and by how much it is stronger at the others.
     strength: f64,
-    right: f64,
-    down: f64,
-    /// The least and the greatest of the corners.
+    more: [f64; 2],
+    /// Four times by how much it is stronger half-way between two corners than their mean; `None`: by nothing that counts.
+    bend: Option<[f64; 3]>,
+    /// The least and the greatest of all these places.
     range: [f64; 2],
 }
 
 impl Even {
     /// `None` if the triangle has no area.
-    fn new([p, q, r]: [Corner; 3], [a, b, c]: [f64; 3]) -> Option<Even> {
+    fn new([p, q, r]: [Corner; 3], CornerLight { at: [a, b, c], between }: CornerLight) -> Option<Even> {
         let ([x1, y1], [x2, y2]) = ([q.x - p.x, q.y - p.y], [r.x - p.x, r.y - p.y]);
         let area = x1 * y2 - y1 * x2;
-        let (right, down) = (((b - a) * y2 - (c - a) * y1) / area, ((c - a) * x1 - (b - a) * x2) / area);
-        let is_fine = right.is_finite() && down.is_finite();
-        let range = [a.min(b).min(c), a.max(b).max(c)];
-        is_fine.then_some(Even { origin: [p.x, p.y], strength: a, right, down, range })
+        let weights = [[y2 / area, -x2 / area], [-y1 / area, x1 / area]];
+        let is_fine = weights.iter().flatten().all(|weight| weight.is_finite());
+        let all = [a, b, c].into_iter().chain(between.into_iter().flatten());
+        let range = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
+        let bend = between.map(|[ab, bc, ca]| {
+            [4.0 * ab - 2.0 * (a + b), 4.0 * bc - 2.0 * (b + c), 4.0 * ca - 2.0 * (c + a)]
+        });
+        let even = Even { origin: [p.x, p.y], weights, strength: a, more: [b - a, c - a], bend, range };
+        is_fine.then_some(even)
     }
 
-    /// In the middle of a cell, or at a corner if that is outside.
-    fn at(&self, [column, row]: [usize; 2]) -> f64 {
+    /// In the middle of a cell, or about that of the nearest corner if it is outside.
+    pub fn at(&self, [column, row]: [usize; 2]) -> f64 {
         let [x, y] = [column as f64 + 0.5 - self.origin[0], row as f64 + 0.5 - self.origin[1]];
-        (self.strength + self.right * x + self.down * y).clamp(self.range[0], self.range[1])
+        let [v, w] = self.weights.map(|[right, down]| right * x + down * y);
+        let mut strength = self.strength + self.more[0] * v + self.more[1] * w;
+        if let Some([ab, bc, ca]) = self.bend {
+            let u = 1.0 - v - w;
+            strength += ab * u * v + bc * v * w + ca * w * u;
+        }
+        // Not `clamp`, which checks its bounds.
+        strength.max(self.range[0]).min(self.range[1])
     }
 }
 
@@ -68,8 +83,22 @@ impl<'a> Shading<'a> {
 
     /// The strength of light on a triangle in a cell.
     pub fn strength(&mut self, n: usize, cell: [usize; 2]) -> f64 {
+        match self.even(n) {
+            Some(even) => even.at(cell),
+            None => self.uneven(n, cell),
+        }
+    }
+
+    /// That on a triangle on which it does not change evenly.
+    pub fn uneven(&self, n: usize, cell: [usize; 2]) -> f64 {
+        self.lit.strength(n, weights(self.lit.corners(n), cell))
+    }
+
+    /// How light changes on a triangle if it does so evenly.
+    pub fn even(&mut self, n: usize) -> Option<Even> {
         if let Known::Not = self.known[n] {
-            self.known[n] = match self.even(n) {
+            let found = self.lit.at_corners(n, &mut self.by_normal);
+            self.known[n] = match found.and_then(|light| Even::new(self.lit.corners(n), light)) {
                 Some(even) => {
                     self.even.push(even);
                     Known::Even(self.even.len() as u32 - 1)
@@ -78,13 +107,8 @@ impl<'a> Shading<'a> {
             };
         }
         match self.known[n] {
-            Known::Even(number) => self.even[number as usize].at(cell),
-            Known::Not | Known::Uneven => self.lit.strength(n, weights(self.lit.corners(n), cell)),
+            Known::Even(number) => self.even.get(number as usize).copied(),
+            Known::Not | Known::Uneven => None,
         }
-    }
-
-    fn even(&mut self, n: usize) -> Option<Even> {
-        let strengths = self.lit.at_corners(n, &mut self.by_normal)?;
-        Even::new(self.lit.corners(n), strengths)
     }
 }
