@@ -9,6 +9,7 @@ use super::spans::Spans;
 use super::tones::Tones;
 use crate::raster::Pattern;
 use crate::raster::cells::{self, Given};
+use crate::raster::samples::at_samples;
 
 /// The item of a triangle without its tone, the number of that with some tone, and whether it has shades.
 #[derive(Clone, Copy)]
@@ -96,13 +97,11 @@ impl AtEdges<'_> {
         shading: &mut Shading,
     ) -> Vec<Sample> {
         let Seen { lit, numbers, size, spans, .. } = self.seen;
-        // Cells without a place come after all others.
-        let place = |cell: usize| (self.places[cell] as usize).wrapping_sub(1);
         let mut in_front = vec![false; items.len() + 1];
         let middles = spans.cells().flat_map(|cells| &numbers[cells]);
         middles.for_each(|[number]| in_front[*number as usize] = true);
         let triangles = Given { count: items.len(), corners: |n| lit.snapped(n), cut: |n| lit.cut(n, N) };
-        let seen = cells::at_samples(pattern, size, &triangles, (self.cells, place), |n| in_front[n + 1]);
+        let seen = at_samples(pattern, size, &triangles, (self.cells, self.places), |n| in_front[n + 1]);
         let mut samples = Vec::with_capacity(self.cells.len() * N);
         let mut known: Vec<(u32, Sample)> = Vec::with_capacity(N);
         for (cell, numbers) in self.cells.iter().zip(&seen.numbers) {

@@ -14,6 +14,7 @@ use super::tones::{MOST, Tones};
 use crate::formats::png::Lit;
 use crate::raster::SIXTEEN;
 use crate::raster::cells::{self, Given, Nearest};
+use crate::raster::samples::EIGHT;
 use crate::triangles::{Triangle, Triangles};
 use dlsys_geometry::scene::{MaterialId, OwnerId};
 
@@ -178,10 +179,10 @@ pub fn label(
     let at_edges = AtEdges { seen, places: &places, cells: &edge_cells, tones, of_item: &of_item };
     let face_items = face_items(&item_of, &of_item);
     let samples = match is_fine {
-        true => at_edges.samples(&cells::EIGHT, &face_items, &mut shading),
+        true => at_edges.samples(&EIGHT, &face_items, &mut shading),
         false => at_edges.samples(&SIXTEEN, &face_items, &mut shading),
     };
-    let per_cell = if is_fine { cells::EIGHT.len() } else { SIXTEEN.len() };
+    let per_cell = if is_fine { EIGHT.len() } else { SIXTEEN.len() };
     let least =
         shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / f64::from(shade.item.shades)).collect();
     let steps = shades.iter().map(|shade| shade.step).collect();
@@ -263,7 +264,7 @@ impl Cells {
                 item.tone = tones.nearest(item.look.1, color);
             }
             let strength = match even {
-                Some(even) => even.at(at),
+                Some(even) => even.at(at).into(),
                 None if has_shades => shading.uneven(n, at),
                 None => 0.0,
             };

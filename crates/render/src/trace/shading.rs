@@ -10,45 +10,51 @@ use crate::raster::cells::weights;
 /// The strength of light between three corners, as a function of a place in cells.
 #[derive(Clone, Copy)]
 pub struct Even {
-    origin: [f64; 2],
+    origin: [f32; 2],
     /// The weights of the second and of the third corner: what a cell to the right and one down add.
-    weights: [[f64; 2]; 2],
+    weights: [[f32; 2]; 2],
     /// At the first corner, and by how much it is stronger at the others.
-    strength: f64,
-    more: [f64; 2],
-    /// Four times by how much it is stronger half-way between two corners than their mean; `None`: by nothing that counts.
-    bend: Option<[f64; 3]>,
+    strength: f32,
+    more: [f32; 2],
+    /// Four times by how much it is stronger half-way between two corners than their mean.
+    bend: [f32; 3],
     /// The least and the greatest of all these places.
-    range: [f64; 2],
+    range: [f32; 2],
 }
 
 impl Even {
     /// `None` if the triangle has no area.
     fn new([p, q, r]: [Corner; 3], CornerLight { at: [a, b, c], between }: CornerLight) -> Option<Even> {
         let ([x1, y1], [x2, y2]) = ([q.x - p.x, q.y - p.y], [r.x - p.x, r.y - p.y]);
-        let area = x1 * y2 - y1 * x2;
-        let weights = [[y2 / area, -x2 / area], [-y1 / area, x1 / area]];
+        let by_area = 1.0 / (x1 * y2 - y1 * x2);
+        let weights = [[y2, -x2], [-y1, x1]].map(|weight| weight.map(|by| (by * by_area) as f32));
         let is_fine = weights.iter().flatten().all(|weight| weight.is_finite());
         let all = [a, b, c].into_iter().chain(between.into_iter().flatten());
         let range = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)]);
-        let bend = between.map(|[ab, bc, ca]| {
+        let bend = between.map_or([0.0; 3], |[ab, bc, ca]| {
             [4.0 * ab - 2.0 * (a + b), 4.0 * bc - 2.0 * (b + c), 4.0 * ca - 2.0 * (c + a)]
         });
-        let even = Even { origin: [p.x, p.y], weights, strength: a, more: [b - a, c - a], bend, range };
-        is_fine.then_some(even)
+        is_fine.then(|| Even {
+            origin: [p.x - 0.5, p.y - 0.5].map(|at| at as f32),
+            weights,
+            strength: a as f32,
+            more: [b - a, c - a].map(|more| more as f32),
+            bend: bend.map(|bend| bend as f32),
+            range: range.map(|bound| bound as f32),
+        })
     }
 
     /// In the middle of a cell, or about that of the nearest corner if it is outside.
-    pub fn at(&self, [column, row]: [usize; 2]) -> f64 {
-        let [x, y] = [column as f64 + 0.5 - self.origin[0], row as f64 + 0.5 - self.origin[1]];
+    pub fn at(&self, [column, row]: [usize; 2]) -> f32 {
+        let [x, y] = [column as f32 - self.origin[0], row as f32 - self.origin[1]];
         let [v, w] = self.weights.map(|[right, down]| right * x + down * y);
-        let mut strength = self.strength + self.more[0] * v + self.more[1] * w;
-        if let Some([ab, bc, ca]) = self.bend {
-            let u = 1.0 - v - w;
-            strength += ab * u * v + bc * v * w + ca * w * u;
-        }
-        // Not `clamp`, which checks its bounds.
-        strength.max(self.range[0]).min(self.range[1])
+        let u = 1.0 - v - w;
+        let [ab, bc, ca] = self.bend;
+        let strength =
+            self.strength + self.more[0] * v + self.more[1] * w + ab * u * v + bc * v * w + ca * w * u;
+        let [low, high] = self.range;
+        let strength = if strength > low { strength } else { low };
+        if strength < high { strength } else { high }
     }
 }
 
@@ -84,7 +90,7 @@ impl<'a> Shading<'a> {
     /// The strength of light on a triangle in a cell.
     pub fn strength(&mut self, n: usize, cell: [usize; 2]) -> f64 {
         match self.even(n) {
-            Some(even) => even.at(cell),
+            Some(even) => even.at(cell).into(),
             None => self.uneven(n, cell),
         }
     }
