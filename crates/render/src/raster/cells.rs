@@ -6,6 +6,10 @@ use super::plane::Ready;
 use super::{Corner, EQUAL, Place, STEPS};
 use crate::mapping::Cut;
 
+/// Pixels that are worked on at a time.
+const LANES: usize = 4;
+/// The largest side of a small triangle, in steps.
+const SMALL: i64 = 24 * STEPS;
 /// Half a pixel.
 const HALF: i64 = STEPS / 2;
 
@@ -40,6 +44,10 @@ pub(crate) fn in_middles<'c>(
         }
         let Some(ready) = Ready::new(corners, width, &(0..height)) else { continue };
         let cut = (triangles.cut)(number);
+        if cut.is_none() && is_small(&corners) && columns.len().next_multiple_of(LANES) <= width {
+            nearest.add_small(number as u32 + 1, &ready, [columns, rows], (width, &mut spans));
+            continue;
+        }
         nearest.add_middles(number as u32 + 1, &ready, [columns, rows], (width, &mut spans), cut.as_ref());
     }
     spans.iter_mut().filter(|[first, _]| *first == u32::MAX).for_each(|span| *span = [0; 2]);
@@ -53,7 +61,59 @@ fn middles(at: [i32; 3], count: usize) -> Range<usize> {
     low.max(0) as usize..high.clamp(0, count as i64) as usize
 }
 
+/// Whether a triangle is so small that the functions of its sides are within 32 bits, and that it takes longer to find its sides row by row than to look at
+/// all pixels around it.
+fn is_small(corners: &[Place; 3]) -> bool {
+    let within = |at: [i32; 3]| {
+        let [low, high] = [at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2])];
+        i64::from(high) - i64::from(low) <= SMALL
+    };
+    within(corners.map(|corner| corner.x)) && within(corners.map(|corner| corner.y))
+}
+
 impl Nearest<1> {
+    /// Adds a small triangle. It works on several pixels at a time, without branches.
+    fn add_small(
+        &mut self,
+        number: u32,
+        ready: &Ready,
+        [columns, rows]: [Range<usize>; 2],
+        (width, spans): (usize, &mut [[u32; 2]]),
+    ) {
+        let plane = ready.plane;
+        let count = columns.len().next_multiple_of(LANES);
+        // Beside the triangle, nothing changes.
+        let first = columns.start.min(width - count);
+        let ahead = [(first, ready.columns[0]), (rows.start, ready.rows[0])]
+            .map(|(to, from)| STEPS * (to as i64 - from as i64) + HALF);
+        let mut start = ready.sides.map(|[value, a, b]| (value + a * ahead[0] + b * ahead[1]) as i32);
+        let [right, down] = [1, 2].map(|k| ready.sides.map(|side| (side[k] * STEPS) as i32));
+        for row in rows {
+            let mut here = start;
+            (0..3).for_each(|k| start[k] += down[k]);
+            let (mut depth, slope) = plane.along([first, row]);
+            let cells = row * width + first..row * width + first + count;
+            let held = self.numbers[cells.clone()].as_chunks_mut::<LANES>().0;
+            let behind = self.depths[cells].as_chunks_mut::<LANES>().0;
+            for (held, behind) in held.iter_mut().zip(behind) {
+                for k in 0..LANES {
+                    let by = k as i32;
+                    let [p, q, r] = [0, 1, 2].map(|side| here[side] + right[side] * by);
+                    let depth = plane.bounded(depth + slope * by as f32);
+                    // Later ones have greater numbers.
+                    let is_seen = (p | q | r >= 0) & (depth + EQUAL >= behind[k][0]);
+                    let nearest = if depth > behind[k][0] { depth } else { behind[k][0] };
+                    behind[k][0] = if is_seen { nearest } else { behind[k][0] };
+                    held[k][0] = if is_seen { number } else { held[k][0] };
+                }
+                (0..3).for_each(|side| here[side] += right[side] * LANES as i32);
+                depth += slope * LANES as f32;
+            }
+            let [from, end] = &mut spans[row];
+            (*from, *end) = ((*from).min(columns.start as u32), (*end).max(columns.end as u32));
+        }
+    }
+
     fn add_middles(
         &mut self,
         number: u32,
