@@ -9,10 +9,8 @@ use crate::mapping::Cut;
 
 /// Eight samples, no two in a row or column.
 pub(crate) const EIGHT: Pattern<8> = [(1, -3), (-1, 3), (5, 1), (-3, -5), (-5, 5), (-7, -1), (3, 7), (7, -7)];
-/// In a rectangle of no more pixels than this, those that have samples are looked for before it is known which the triangle touches.
-const FEW: usize = 256;
-/// Pixels along a side of a block, as a power of two.
-const BLOCK: u32 = 3;
+/// Pixels along a side of a block.
+const BLOCK: usize = 8;
 
 /// Finds the nearest triangle at each sample of these pixels; `places` has the number of each among them, from 1 on, and 0 for others. Of two at the same
 /// depth it is the later. Triangles that are known to be `seen` come first, so that most others are hidden by then.
@@ -27,58 +25,57 @@ pub(crate) fn at_samples<'c, const N: usize>(
     let mut nearest = Nearest { numbers: vec![[0; N]; count], depths: vec![[f32::NEG_INFINITY; N]; count] };
     let Given { corners, cut, .. } = triangles;
     let area = Area { samples: &fragments::places(pattern), places, size };
+    let blocks = Blocks::new(size, pixels, |_| f32::NEG_INFINITY);
     for number in (0..triangles.count).filter(|number| seen(*number)) {
-        nearest.add(&area, (number, corners(number), || cut(number)), |_, _| true);
+        nearest.add(&area, &blocks, (number, corners(number), || cut(number)), |_, _| true);
     }
     let farthest = |depths: &[f32; N]| depths.iter().copied().fold(f32::INFINITY, f32::min);
     let far: Vec<f32> = nearest.depths.iter().map(farthest).collect();
-    let is_open = |place: usize, depth: f32| far.get(place).is_some_and(|far| depth + EQUAL >= *far);
-    let blocks = Blocks::new(size, pixels, &far);
+    let blocks = Blocks::new(size, pixels, |place| far[place]);
+    let is_open = |place: usize, depth: f32| depth + EQUAL >= far[place];
     for number in (0..triangles.count).filter(|number| !seen(*number)) {
-        let corners = corners(number);
-        if blocks.is_open(&corners) {
-            nearest.add(&area, (number, corners, || cut(number)), is_open);
-        }
+        nearest.add(&area, &blocks, (number, corners(number), || cut(number)), is_open);
     }
     nearest
 }
 
 /// By block of pixels the depth of what is farthest in those that have samples, so that most of what is hidden is passed at once.
 struct Blocks {
-    size: [usize; 2],
+    /// Blocks in a row.
+    width: usize,
     far: Vec<f32>,
 }
 
 impl Blocks {
-    /// Of these pixels, which have these depths.
-    fn new([width, height]: [usize; 2], pixels: &[u32], depths: &[f32]) -> Blocks {
-        let size = [width, height].map(|side| (side >> BLOCK) + 1);
+    /// Of these pixels. What is there is at this depth.
+    fn new([width, height]: [usize; 2], pixels: &[u32], depth: impl Fn(usize) -> f32) -> Blocks {
+        let size = [width, height].map(|side| side.div_ceil(BLOCK));
         let mut far = vec![f32::INFINITY; size[0] * size[1]];
-        for (pixel, depth) in pixels.iter().zip(depths) {
-            let [column, row] = [*pixel as usize % width, *pixel as usize / width].map(|at| at >> BLOCK);
+        for (place, pixel) in pixels.iter().enumerate() {
+            let [column, row] = [*pixel as usize % width, *pixel as usize / width].map(|at| at / BLOCK);
             let known = &mut far[row * size[0] + column];
-            *known = known.min(*depth);
+            *known = depth(place).min(*known);
         }
-        Blocks { size, far }
+        Blocks { width: size[0], far }
     }
 
-    /// Whether a triangle may be in front of something.
-    fn is_open(&self, corners: &[Place; 3]) -> bool {
-        let front = front(corners);
-        let range = |at: [i32; 3], count| range(at.map(|at| i64::from(at) >> BLOCK), count);
-        let columns = range(corners.map(|corner| corner.x), self.size[0]);
-        let rows = range(corners.map(|corner| corner.y), self.size[1]);
-        let Some(([left, right], [top, bottom])) = columns.zip(rows) else { return false };
-        (top..=bottom).any(|row| {
-            let line = &self.far[row * self.size[0]..][left..=right];
-            line.iter().any(|far| front + EQUAL >= *far)
+    /// Those parts of a rectangle of pixels, each within a block, in which something at this depth may be seen: first and last columns, first and last rows.
+    fn open(
+        &self,
+        [[left, right], [top, bottom]]: [[usize; 2]; 2],
+        depth: f32,
+    ) -> impl Iterator<Item = [[usize; 2]; 2]> {
+        let within = move |block: usize, [first, last]: [usize; 2]| {
+            [first.max(block * BLOCK), last.min(block * BLOCK + BLOCK - 1)]
+        };
+        let rows = top / BLOCK..=bottom / BLOCK;
+        rows.flat_map(move |row| {
+            let line = &self.far[row * self.width..][..=right / BLOCK];
+            let blocks = line.iter().enumerate().skip(left / BLOCK);
+            let open = blocks.filter(move |(_, far)| depth + EQUAL >= **far);
+            open.map(move |(column, _)| [within(column, [left, right]), within(row, [top, bottom])])
         })
     }
-}
-
-/// The depth of the nearest corner.
-fn front(corners: &[Place; 3]) -> f32 {
-    corners[0].depth.max(corners[1].depth).max(corners[2].depth)
 }
 
 /// Where there are samples.
@@ -113,9 +110,11 @@ impl<'c, const N: usize> Drawn<'c, N> {
         sides.map(|[value, a, b]| value + a * by[0] + b * by[1])
     }
 
-    /// Whether all samples of a pixel where the functions of the sides have these values are outside.
-    fn is_beside(&self, here: [i64; 3]) -> bool {
-        (here[0] + self.most[0]) | (here[1] + self.most[1]) | (here[2] + self.most[2]) < 0
+    /// Whether all of so many pixels to the right and down from one are outside.
+    fn is_beside(&self, pixel: [usize; 2], count: usize) -> bool {
+        let here = self.at(pixel);
+        let most = self.most.map(|most| most * count as i64);
+        (here[0] + most[0]) | (here[1] + most[1]) | (here[2] + most[2]) < 0
     }
 }
 
@@ -124,74 +123,45 @@ impl<const N: usize> Nearest<N> {
     fn add<'c>(
         &mut self,
         area: &Area<N>,
+        blocks: &Blocks,
         (number, corners, cut): (usize, [Place; 3], impl FnOnce() -> Option<Cut<'c>>),
         is_open: impl Fn(usize, f32) -> bool,
     ) {
         let [width, height] = area.size;
         let columns = range(corners.map(|corner| i64::from(corner.x)), width);
         let rows = range(corners.map(|corner| i64::from(corner.y)), height);
-        let Some(([left, right], [top, bottom])) = columns.zip(rows) else { return };
-        let front = front(&corners);
-        let open = |[column, row]: [usize; 2]| {
-            let place = (area.places[row * width + column] as usize).checked_sub(1)?;
-            is_open(place, front).then_some(place)
-        };
-        let drawn = || {
-            let ready = Ready::new(corners, width, &(0..height))?;
-            Some(Drawn::new(number as u32 + 1, ready, cut(), area.samples))
-        };
-        if (right - left + 1) * (bottom - top + 1) > FEW {
-            if let Some(drawn) = drawn() {
-                self.add_large(area, &drawn, open);
+        let Some((columns, rows)) = columns.zip(rows) else { return };
+        let front = corners[0].depth.max(corners[1].depth).max(corners[2].depth);
+        // Most triangles touch no pixel that has samples.
+        let (mut drawn, mut cut): (Option<Drawn<N>>, _) = (None, Some(cut));
+        for [columns, rows] in blocks.open([columns, rows], front) {
+            if drawn.as_ref().is_some_and(|drawn| drawn.is_beside([columns[0], rows[0]], BLOCK)) {
+                continue;
             }
-            return;
-        }
-        // Most of them touch no pixel that has samples.
-        let mut pixels = (top..=bottom).flat_map(|row| (left..=right).map(move |column| [column, row]));
-        let Some(first) = pixels.find(|pixel| open(*pixel).is_some()) else { return };
-        let Some(drawn) = drawn() else { return };
-        for pixel in std::iter::once(first).chain(pixels) {
-            let Some(place) = open(pixel) else { continue };
-            let here = drawn.at(pixel);
-            if !drawn.is_beside(here) {
-                self.add_at(place, area, &drawn, (pixel, here));
-            }
-        }
-    }
-
-    /// Adds a triangle row by row, from side to side.
-    fn add_large(&mut self, area: &Area<N>, drawn: &Drawn<N>, open: impl Fn([usize; 2]) -> Option<usize>) {
-        let Ready { columns, rows, sides, .. } = &drawn.ready;
-        for row in rows[0]..=rows[1] {
-            let mut corner = drawn.at([columns[0], row]);
-            let mut entered = false;
-            for column in columns[0]..=columns[1] {
-                let here = corner;
-                (0..3).for_each(|k| corner[k] += sides[k][1] * STEPS);
-                if drawn.is_beside(here) {
-                    if entered {
-                        break;
+            for row in rows[0]..=rows[1] {
+                for column in columns[0]..=columns[1] {
+                    let place = (area.places[row * width + column] as usize).wrapping_sub(1);
+                    if place >= self.numbers.len() || !is_open(place, front) {
+                        continue;
                     }
-                    continue;
-                }
-                entered = true;
-                if let Some(place) = open([column, row]) {
-                    self.add_at(place, area, drawn, ([column, row], here));
+                    if drawn.is_none() {
+                        let ready = Ready::new(corners, width, &(0..height));
+                        let cut = cut.take().and_then(|cut| cut());
+                        drawn = ready.map(|ready| Drawn::new(number as u32 + 1, ready, cut, area.samples));
+                    }
+                    let Some(drawn) = &drawn else { return };
+                    if !drawn.is_beside([column, row], 1) {
+                        self.add_at(place, area, drawn, [column, row]);
+                    }
                 }
             }
         }
     }
 
     /// Adds a triangle in a pixel.
-    fn add_at(
-        &mut self,
-        place: usize,
-        area: &Area<N>,
-        drawn: &Drawn<N>,
-        (pixel, here): ([usize; 2], [i64; 3]),
-    ) {
+    fn add_at(&mut self, place: usize, area: &Area<N>, drawn: &Drawn<N>, pixel: [usize; 2]) {
         let [xs, ys] = area.samples;
-        let covered = drawn.cover.mask(here);
+        let covered = drawn.cover.mask(drawn.at(pixel));
         let mask = drawn.cut.as_ref().map_or(covered, |cut| left_of(cut, covered, pixel, area.samples));
         if mask == 0 {
             return;
