@@ -11,6 +11,8 @@ use crate::mapping::Cut;
 pub(crate) const EIGHT: Pattern<8> = [(1, -3), (-1, 3), (5, 1), (-3, -5), (-5, 5), (-7, -1), (3, 7), (7, -7)];
 /// Pixels along a side of a block.
 const BLOCK: usize = 8;
+/// The first column of a block.
+const COLUMN: u64 = 0x0101_0101_0101_0101;
 
 /// Finds the nearest triangle at each sample of these pixels; `places` has the number of each among them, from 1 on, and 0 for others. Of two at the same
 /// depth it is the later. Triangles that are known to be `seen` come first, so that most others are hidden by then.
@@ -39,41 +41,48 @@ pub(crate) fn at_samples<'c, const N: usize>(
     nearest
 }
 
-/// By block of pixels the depth of what is farthest in those that have samples, so that most of what is hidden is passed at once.
+/// Pixels that have samples, by blocks, so that those of them that a triangle may touch are found at once.
 struct Blocks {
     /// Blocks in a row.
     width: usize,
+    /// By block: the depth of what is farthest in its pixels, and these, a bit each, row by row.
     far: Vec<f32>,
+    pixels: Vec<u64>,
 }
 
 impl Blocks {
     /// Of these pixels. What is there is at this depth.
     fn new([width, height]: [usize; 2], pixels: &[u32], depth: impl Fn(usize) -> f32) -> Blocks {
         let size = [width, height].map(|side| side.div_ceil(BLOCK));
-        let mut far = vec![f32::INFINITY; size[0] * size[1]];
+        let count = size[0] * size[1];
+        let mut blocks = Blocks { width: size[0], far: vec![f32::INFINITY; count], pixels: vec![0; count] };
         for (place, pixel) in pixels.iter().enumerate() {
-            let [column, row] = [*pixel as usize % width, *pixel as usize / width].map(|at| at / BLOCK);
-            let known = &mut far[row * size[0] + column];
-            *known = depth(place).min(*known);
+            let (column, row) = (*pixel as usize % width, *pixel as usize / width);
+            let block = row / BLOCK * size[0] + column / BLOCK;
+            blocks.pixels[block] |= 1 << (row % BLOCK * BLOCK + column % BLOCK);
+            blocks.far[block] = depth(place).min(blocks.far[block]);
         }
-        Blocks { width: size[0], far }
+        blocks
     }
 
-    /// Those parts of a rectangle of pixels, each within a block, in which something at this depth may be seen: first and last columns, first and last rows.
-    fn open(
-        &self,
-        [[left, right], [top, bottom]]: [[usize; 2]; 2],
-        depth: f32,
-    ) -> impl Iterator<Item = [[usize; 2]; 2]> {
-        let within = move |block: usize, [first, last]: [usize; 2]| {
-            [first.max(block * BLOCK), last.min(block * BLOCK + BLOCK - 1)]
+    /// Of each block in which something at this depth may be seen its first pixel, and its pixels within a rectangle, given by its first and last columns and
+    /// rows.
+    fn open(&self, [columns, rows]: [[usize; 2]; 2], depth: f32) -> impl Iterator<Item = ([usize; 2], u64)> {
+        // The bits from the first to the last of a range that is within a block in part.
+        let within = |block: usize, [first, last]: [usize; 2], apart: u32| {
+            let (from, to) = (first.saturating_sub(block * BLOCK), (last - block * BLOCK).min(BLOCK - 1));
+            let bits = u64::MAX >> (64 - apart * (to + 1) as u32);
+            bits & !0 << (apart * from as u32)
         };
-        let rows = top / BLOCK..=bottom / BLOCK;
-        rows.flat_map(move |row| {
-            let line = &self.far[row * self.width..][..=right / BLOCK];
-            let blocks = line.iter().enumerate().skip(left / BLOCK);
-            let open = blocks.filter(move |(_, far)| depth + EQUAL >= **far);
-            open.map(move |(column, _)| [within(column, [left, right]), within(row, [top, bottom])])
+        let blocks = |[first, last]: [usize; 2]| first / BLOCK..=last / BLOCK;
+        blocks(rows).flat_map(move |row| {
+            let lines = within(row, rows, BLOCK as u32);
+            blocks(columns).filter_map(move |column| {
+                let block = row * self.width + column;
+                let is_open = depth + EQUAL >= self.far[block];
+                let pixels = self.pixels[block] & lines & within(column, columns, 1) * COLUMN;
+                (is_open && pixels != 0).then_some(([column * BLOCK, row * BLOCK], pixels))
+            })
         })
     }
 }
@@ -134,25 +143,26 @@ impl<const N: usize> Nearest<N> {
         let front = corners[0].depth.max(corners[1].depth).max(corners[2].depth);
         // Most triangles touch no pixel that has samples.
         let (mut drawn, mut cut): (Option<Drawn<N>>, _) = (None, Some(cut));
-        for [columns, rows] in blocks.open([columns, rows], front) {
-            if drawn.as_ref().is_some_and(|drawn| drawn.is_beside([columns[0], rows[0]], BLOCK)) {
+        for (first, mut pixels) in blocks.open([columns, rows], front) {
+            if drawn.as_ref().is_some_and(|drawn| drawn.is_beside(first, BLOCK)) {
                 continue;
             }
-            for row in rows[0]..=rows[1] {
-                for column in columns[0]..=columns[1] {
-                    let place = (area.places[row * width + column] as usize).wrapping_sub(1);
-                    if place >= self.numbers.len() || !is_open(place, front) {
-                        continue;
-                    }
-                    if drawn.is_none() {
-                        let ready = Ready::new(corners, width, &(0..height));
-                        let cut = cut.take().and_then(|cut| cut());
-                        drawn = ready.map(|ready| Drawn::new(number as u32 + 1, ready, cut, area.samples));
-                    }
-                    let Some(drawn) = &drawn else { return };
-                    if !drawn.is_beside([column, row], 1) {
-                        self.add_at(place, area, drawn, [column, row]);
-                    }
+            while pixels != 0 {
+                let bit = pixels.trailing_zeros() as usize;
+                pixels &= pixels - 1;
+                let pixel = [first[0] + bit % BLOCK, first[1] + bit / BLOCK];
+                let place = area.places[pixel[1] * width + pixel[0]] as usize - 1;
+                if !is_open(place, front) {
+                    continue;
+                }
+                if drawn.is_none() {
+                    let ready = Ready::new(corners, width, &(0..height));
+                    let cut = cut.take().and_then(|cut| cut());
+                    drawn = ready.map(|ready| Drawn::new(number as u32 + 1, ready, cut, area.samples));
+                }
+                let Some(drawn) = &drawn else { return };
+                if !drawn.is_beside(pixel, 1) {
+                    self.add_at(place, area, drawn, pixel);
                 }
             }
         }
