@@ -21,6 +21,8 @@ use dlsys_geometry::scene::{MaterialId, OwnerId};
 /// Shades between black and a colour as it is; and of what is so large in the picture that the steps between shades would show.
 pub const SHADES: u8 = 20;
 const FINE_SHADES: u8 = 60;
+/// No step is below this.
+const DARKEST: i32 = -256;
 /// What covers so many pixels is large.
 const LARGE: f64 = 10_000.0;
 /// Of so many rows and columns one each is looked at to tell what is large, and what is less wide than so many of those is not: in gaps between
@@ -83,9 +85,9 @@ impl Item {
 
     /// The shade of a strength of light.
     pub fn step(&self, strength: f64) -> i32 {
-        /// More steps than there are below 0, so that a cut rounds down.
-        const BELOW: i32 = 1 << 16;
-        (strength * f64::from(self.shades) + f64::from(BELOW) + 0.5) as i32 - BELOW
+        // Not below 0, so that a cut rounds down.
+        let above = strength * f64::from(self.shades) - f64::from(DARKEST) + 0.5;
+        (above as i32).max(0) + DARKEST
     }
 }
 
@@ -156,8 +158,9 @@ pub fn label(
         labels: empty(&mut rasters.labels, room, NOTHING),
         strengths: empty(&mut rasters.strengths, room, 0.0),
         shades: Vec::new(),
-        known: FxHashMap::default(),
+        items: FxHashMap::default(),
         last: None,
+        tables: Vec::new(),
     };
     cells.fill(seen, &item_of, tones, &mut shading);
     let Cells { mut labels, strengths, mut shades, .. } = cells;
@@ -221,8 +224,10 @@ struct Cells {
     labels: Vec<u32>,
     strengths: Vec<f32>,
     shades: Vec<Shade>,
-    known: FxHashMap<(Item, i32), u32>,
-    last: Option<((Item, i32), u32)>,
+    /// By item: the number of its table, and of the last item; a table has the number of each shade from the darkest on, plus 1, or 0.
+    items: FxHashMap<Item, usize>,
+    last: Option<(Item, usize)>,
+    tables: Vec<Vec<u32>>,
 }
 
 impl Cells {
@@ -278,16 +283,24 @@ impl Cells {
 
     /// The number of a shade of an item.
     fn number(&mut self, item: Item, step: i32) -> u32 {
-        let key = (item, step);
-        if let Some((_, number)) = self.last.filter(|(last, _)| *last == key) {
-            return number;
+        let table = match self.last.filter(|(last, _)| *last == item) {
+            Some((_, table)) => table,
+            None => *self.items.entry(item).or_insert_with(|| {
+                self.tables.push(Vec::new());
+                self.tables.len() - 1
+            }),
+        };
+        self.last = Some((item, table));
+        let table = &mut self.tables[table];
+        let at = (step - DARKEST) as usize;
+        if at >= table.len() {
+            table.resize(at + 1, 0);
         }
-        let number = *self.known.entry(key).or_insert_with(|| {
+        if table[at] == 0 {
             self.shades.push(Shade::new(item, step, 0.0, 0));
-            self.shades.len() as u32 - 1
-        });
-        self.last = Some((key, number));
-        number
+            table[at] = self.shades.len() as u32;
+        }
+        table[at] - 1
     }
 }
 

@@ -32,6 +32,8 @@ pub(crate) struct Rasters {
 pub(crate) struct Marks {
     pub(super) on: [Vec<u32>; 3],
     last: u32,
+    /// Of no cell anything between pictures.
+    pub(super) first: Vec<u32>,
 }
 
 impl Marks {

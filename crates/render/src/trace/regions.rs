@@ -19,6 +19,8 @@ const WITHIN: f64 = 0.004;
 
 /// No region.
 pub const NOTHING: u32 = u32::MAX;
+/// No cell around has samples.
+pub const NO_SAMPLES: u32 = u32::MAX;
 /// Cells that will be drawn over by something else, so that regions may reach there.
 pub const COVERED: u32 = u32::MAX - 1;
 
@@ -67,11 +69,11 @@ struct Marks<'a> {
 }
 
 /// Where the samples of cells at edges come in the order of painting.
-struct Ranks {
+struct Ranks<'a> {
     per_cell: usize,
     all: Vec<u64>,
-    /// By cell: the first item that is seen in it, plus 1; or 0 if something is open.
-    least: Vec<u32>,
+    /// By cell: the first item that is seen in it or in those around it, plus 1, as far as there are samples; or 0 if something is open.
+    first: &'a mut [u32],
 }
 
 /// Where a shade of an item comes in the order of painting: after 0, which is nothing.
@@ -79,13 +81,29 @@ fn rank(item: u32, step: i32) -> u64 {
     (u64::from(item) + 1) << 32 | u64::from(step as u32 ^ 1 << 31)
 }
 
-impl Ranks {
-    fn of(regions: &Regions) -> Ranks {
+impl<'a> Ranks<'a> {
+    /// `first` is of a raster in which no cell has samples.
+    fn of(regions: &Regions, first: &'a mut [u32]) -> Ranks<'a> {
         let of = |sample: &Sample| if sample.item == NOTHING { 0 } else { rank(sample.item, sample.step) };
         let all: Vec<u64> = regions.samples.iter().map(of).collect();
-        let cells = all.chunks_exact(regions.per_cell);
-        let least = cells.map(|ranks| ranks.iter().fold(u64::MAX, |a, b| a.min(*b)) >> 32);
-        Ranks { per_cell: regions.per_cell, least: least.map(|item| item as u32).collect(), all }
+        for (cell, ranks) in regions.edge_cells.iter().zip(all.chunks_exact(regions.per_cell)) {
+            let least = (ranks.iter().fold(u64::MAX, |a, b| a.min(*b)) >> 32) as u32;
+            for near in regions.cross(*cell as usize) {
+                if let Some(first) = first.get_mut(near) {
+                    *first = least.min(*first);
+                }
+            }
+        }
+        Ranks { per_cell: regions.per_cell, all, first }
+    }
+
+    /// Takes the samples away.
+    fn clear(self, regions: &Regions) {
+        for cell in regions.edge_cells.iter().flat_map(|cell| regions.cross(*cell as usize)) {
+            if let Some(first) = self.first.get_mut(cell) {
+                *first = NO_SAMPLES;
+            }
+        }
     }
 
     /// The part of the samples of a cell that comes no earlier.
@@ -164,7 +182,10 @@ impl Regions {
     /// The outlines of `count` regions, by number, in cells from the upper left corner.
     pub fn outlines(&self, count: usize, memory: &mut Memory) -> Vec<Vec<Vec<Corner>>> {
         let mut number = memory.begin(self.labels.len());
-        let samples = Ranks::of(self);
+        let cells = self.labels.len();
+        memory.first.resize(cells.max(memory.first.len()), NO_SAMPLES);
+        let mut first = std::mem::take(&mut memory.first);
+        let samples = Ranks::of(self, &mut first);
         let [inside, begun, seen] = memory.on.each_mut().map(|on| &mut on[..self.labels.len()]);
         let mut marks = Marks { inside, begun, seen, holes: number };
         let mut outlines = vec![Vec::new(); count];
@@ -183,6 +204,8 @@ impl Regions {
         }
         let last = number.max(marks.holes);
         memory.end(last);
+        samples.clear(self);
+        memory.first = first;
         outlines
     }
 
@@ -244,12 +267,14 @@ impl Regions {
 
     /// Whether nothing painted before a region shows in a cell, nor in those around it.
     fn is_amid(&self, cell: usize, label: u32, samples: &Ranks) -> bool {
-        let item = self.items[label as usize];
-        let is_whole = |cell: usize| match self.places[cell] {
-            0 => true,
-            place => samples.least[place as usize - 1] > item,
-        };
-        is_whole(cell) && self.around(cell).into_iter().all(is_whole)
+        samples.first[cell] > self.items[label as usize]
+    }
+
+    /// A cell and those beside, above and below it; some may be beyond the raster.
+    fn cross(&self, cell: usize) -> [usize; 5] {
+        let by = |by: usize| [cell.wrapping_sub(by), cell + by];
+        let ([left, right], [up, down]) = (by(1), by(self.width));
+        [cell, left, right, up, down]
     }
 
     /// Adds the cells of a hole, one of which is given, to a piece if all of them are painted later. False if not.
