@@ -124,8 +124,8 @@ pub struct Seen<'a> {
     pub around: &'a Spans,
 }
 
-/// The number of the nearest triangle in the middle of each cell plus 1, or 0, and its depth; and where there are triangles. No picture of this kind has more
-/// than `most` cells.
+/// The number of the nearest triangle in the middle of each cell plus 1, or 0, and its depth; and where there are triangles. Memory is for `most`
+/// cells, if there are no more.
 pub fn nearest(
     mesh: &Triangles,
     lit: &Lit,

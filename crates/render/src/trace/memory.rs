@@ -24,19 +24,19 @@ pub(crate) struct Rasters {
     pub(super) labels: Vec<u32>,
     pub(super) places: Vec<u32>,
     pub(super) strengths: Vec<f32>,
-    pub(super) marks: Marks,
+    pub(super) marks: MarkMemory,
 }
 
 /// Marks on cells, which need not be taken away: those of something new have numbers that no mark has yet.
 #[derive(Debug, Default)]
-pub(crate) struct Marks {
+pub(crate) struct MarkMemory {
     pub(super) on: [Vec<u32>; 3],
     last: u32,
     /// Of no cell anything between pictures.
     pub(super) first: Vec<u32>,
 }
 
-impl Marks {
+impl MarkMemory {
     /// Room for marks on so many cells, and the last number that was used.
     pub(super) fn begin(&mut self, cells: usize) -> u32 {
         if self.last > MOST_MARKS {
@@ -85,4 +85,38 @@ pub(crate) fn empty<T: Clone>(kept: &mut Vec<T>, [cells, most]: [usize; 2], valu
     }
     raster.resize(cells, value);
     raster
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Format, FrameWriter, Survey, View};
+    use dlsys_geometry::scene::{MaterialId, Owner, Point, Polygon, Scene};
+    use dlsys_tree::Lineage;
+
+    /// A fan of polygons that stand in front of one another, of this size.
+    fn fan(size: f64) -> Scene {
+        let mut scene = Scene::default();
+        for i in 0..12 {
+            let owner = scene.add_owner(Owner { name: "P".into(), lineage: Lineage::of_axiom(i) });
+            let (turn, material) = (i as f64 * 0.7, [MaterialId::LEAF, MaterialId::STEM][i % 2]);
+            let at = |x: f64, y: f64| Point::new(x * turn.cos(), y + turn, x * turn.sin()) * size;
+            let vertices = vec![at(0.0, 0.0), at(3.0, 1.0), at(4.0, 5.0), at(1.0, 4.0)];
+            scene.polygons.push(Polygon { vertices, material, owner });
+        }
+        scene
+    }
+
+    #[test]
+    fn pictures_do_not_depend_on_those_before() {
+        let scenes = [1.0, 0.3, 0.8, 0.05, 1.0].map(fan);
+        let mut survey = Survey::new(View::FRONT);
+        scenes.iter().for_each(|scene| survey.add(scene));
+        let writer = || FrameWriter::new(Format::SVG, survey.clone().fit());
+        let kept = writer();
+        for scene in &scenes {
+            let svg = kept.write(scene, "");
+            assert!(String::from_utf8_lossy(&svg).matches("<path").count() > 5);
+            assert_eq!(svg, writer().write(scene, ""));
+        }
+    }
 }

@@ -113,7 +113,7 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     lit.shift(low);
     let size = size.map(|side| side as usize);
     let mut rasters = style.memory.map(Memory::take).unwrap_or_default();
-    let most = (whole[0] * whole[1]) as usize;
+    let most = if style.memory.is_some() { (whole[0] * whole[1]) as usize } else { 0 };
     let (nearest, spans) = label::nearest(&mesh, &lit, (size, most), &mut rasters);
     let around = spans.widened();
     let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };

@@ -103,3 +103,65 @@ impl Pieces {
         runs.map(|run| run.first as usize..run.end as usize)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::regions::NOTHING;
+    use super::*;
+
+    /// The cells of each piece, by a search from cell to cell.
+    fn found(labels: &[u32], width: usize) -> Vec<Vec<usize>> {
+        let mut is_done = vec![false; labels.len()];
+        let mut pieces = Vec::new();
+        for first in 0..labels.len() {
+            if is_done[first] || labels[first] >= COVERED {
+                continue;
+            }
+            let mut cells = vec![first];
+            is_done[first] = true;
+            let mut next = 0;
+            while let Some(&cell) = cells.get(next) {
+                next += 1;
+                let around = [width - 1, width, width + 1].into_iter().chain([1]);
+                for other in around.flat_map(|by| [cell - by, cell + by]) {
+                    if labels[other] == labels[first] && !is_done[other] {
+                        is_done[other] = true;
+                        cells.push(other);
+                    }
+                }
+            }
+            cells.sort_unstable();
+            pieces.push(cells);
+        }
+        pieces
+    }
+
+    #[test]
+    fn pieces_are_those_that_a_search_from_cell_to_cell_finds() {
+        let (width, height) = (14, 12);
+        let mut state = 1_u64;
+        for round in 0..300 {
+            let mut random = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 33) as u32
+            };
+            let mut labels = vec![NOTHING; width * height];
+            let mut rows = vec![[0; 2]; height];
+            for row in 1..height - 1 {
+                // Some rows are empty.
+                if random() % 8 == 0 {
+                    continue;
+                }
+                rows[row] = [1, width as u32 - 1];
+                for column in 1..width - 1 {
+                    let label = random() % (2 + round % 4);
+                    labels[row * width + column] = if label == 0 { COVERED } else { label };
+                }
+            }
+            let pieces = Pieces::of(&labels, width, &Spans::new(width, rows));
+            let cells: Vec<Vec<usize>> =
+                pieces.firsts().map(|first| pieces.cells(first).flatten().collect()).collect();
+            assert_eq!(cells, found(&labels, width), "round {round}");
+        }
+    }
+}

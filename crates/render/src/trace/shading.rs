@@ -118,3 +118,26 @@ impl<'a> Shading<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_is_right_at_corners_and_half_way_between_them() {
+        let corner = |x: f64, y: f64| Corner { x, y, depth: 0.0 };
+        let corners = [corner(2.5, 1.5), corner(8.5, 3.5), corner(4.5, 9.5)];
+        let light = |between| CornerLight { at: [0.5, 0.75, 1.0], between };
+        let bent = Even::new(corners, light(Some([0.75, 0.9, 0.7]))).expect("an area");
+        let expected =
+            [([2, 1], 0.5), ([8, 3], 0.75), ([4, 9], 1.0), ([5, 2], 0.75), ([6, 6], 0.9), ([3, 5], 0.7)];
+        for (cell, strength) in expected {
+            assert!((bent.at(cell) - strength).abs() < 1e-6, "{cell:?}: {}", bent.at(cell));
+        }
+        // Beside it no more and no less than on it.
+        assert_eq!((bent.at([100, 100]), bent.at([0, 0]) >= 0.5), (1.0, true));
+        let plain = Even::new(corners, light(None)).expect("an area");
+        assert!((plain.at([5, 2]) - 0.625).abs() < 1e-6);
+        assert!(Even::new([corner(1.0, 1.0), corner(2.0, 2.0), corner(3.0, 3.0)], light(None)).is_none());
+    }
+}
