@@ -181,12 +181,12 @@ impl Regions {
 
     /// The outlines of `count` regions, by number, in cells from the upper left corner.
     pub fn outlines(&self, count: usize, memory: &mut MarkMemory) -> Vec<Vec<Vec<Corner>>> {
-        let mut number = memory.begin(self.labels.len());
         let cells = self.labels.len();
+        let mut number = memory.begin(cells);
         memory.first.resize(cells.max(memory.first.len()), NO_SAMPLES);
         let mut first = std::mem::take(&mut memory.first);
         let samples = Ranks::of(self, &mut first);
-        let [inside, begun, seen] = memory.on.each_mut().map(|on| &mut on[..self.labels.len()]);
+        let [inside, begun, seen] = memory.on.each_mut().map(|on| &mut on[..cells]);
         let mut marks = Marks { inside, begun, seen, holes: number };
         let mut outlines = vec![Vec::new(); count];
         let pieces = Pieces::of(&self.labels, self.width, &self.around);
@@ -400,6 +400,7 @@ pub(super) mod tests {
         for column in 1..13 {
             let cell = of.width + column;
             of.places[cell] = column as u32;
+            of.edge_cells.push(cell as u32);
             let item = of.labels[cell];
             of.samples.extend([item, item, NOTHING, NOTHING].map(|item| Sample { item, step: 0 }));
         }

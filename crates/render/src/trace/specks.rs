@@ -41,10 +41,11 @@ impl Regions {
     /// Whether no cell that touches this one in the row above, or the one before, is of its region.
     fn is_first(&self, cell: usize) -> bool {
         let label = self.labels[cell];
-        let above = cell - self.width;
-        label < COVERED
-            && self.labels[cell - 1] != label
-            && [above - 1, above, above + 1].into_iter().all(|other| self.labels[other] != label)
+        // None of these is in the first row.
+        label < COVERED && self.labels[cell - 1] != label && {
+            let above = cell - self.width;
+            [above - 1, above, above + 1].into_iter().all(|other| self.labels[other] != label)
+        }
     }
 
     /// Whether the piece of a region of which this is the first cell has so many cells at most: these cells. `is_new` tells whether one is asked for
