@@ -80,7 +80,7 @@ impl Blocks {
             blocks(columns).filter_map(move |column| {
                 let block = row * self.width + column;
                 let is_open = depth + EQUAL >= self.far[block];
-                let pixels = self.pixels[block] & lines & within(column, columns, 1) * COLUMN;
+                let pixels = self.pixels[block] & lines & (within(column, columns, 1) * COLUMN);
                 (is_open && pixels != 0).then_some(([column * BLOCK, row * BLOCK], pixels))
             })
         })
