@@ -82,7 +82,7 @@ impl Light {
     }
 
     /// The part that depends on the direction.
-    fn of_normal(&self, normal: Vector, is_thin: bool) -> f64 {
+    pub(super) fn of_normal(&self, normal: Vector, is_thin: bool) -> f64 {
         // Half-way between the lamp and the viewer.
         let half = Vector::new(LAMP.x, LAMP.y, LAMP.z + 1.0) * HALF;
         let gloss = normal.dot(&half).max(0.0).powi(SHARPNESS) - half.z.powi(SHARPNESS);
@@ -94,7 +94,7 @@ impl Light {
     }
 
     /// The part that is left at a depth.
-    fn at_depth(&self, depth: f64) -> f64 {
+    pub(super) fn at_depth(&self, depth: f64) -> f64 {
         1.0 - self.falloff * (self.near - depth).max(0.0)
     }
 

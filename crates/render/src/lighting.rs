@@ -6,7 +6,7 @@
 use super::casters::Casters;
 use super::haze::{self, Haze};
 use super::lens::Lens;
-use super::light::{GLOSS, SHARPNESS, Spot, TRANSMITTED};
+use super::light::{GLOSS, Light, SHARPNESS, Spot, TRANSMITTED};
 use super::shadow::{Fineness, Maps, OpenSky};
 use super::{Camera, Fit, Page, floor, light};
 use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Surroundings, Vector};
@@ -170,6 +170,11 @@ impl<'a> Lighting<'a> {
     /// The camera that sees it.
     pub(super) fn camera(&self) -> &Camera {
         &self.fit.camera
+    }
+
+    /// The default lamp, unless another light is declared.
+    pub(super) fn lamp(&self) -> Option<&Light> {
+        self.declared.is_none().then_some(&self.fit.light)
     }
 
     /// Whether the light is a declared one, which casts shadows.

@@ -14,6 +14,11 @@ use crate::triangles::Triangles;
 use crate::{Fit, Page, Smoothness, shot};
 use dlsys_geometry::scene::{Color, MaterialId, Palette, Point, Scene, Texture, Vector};
 
+/// The least cosines of the angles between corners where the light between them is a linear, and where it is a quadratic function of the place. The sharpest
+/// part of it, the gloss, has second derivatives of about four, so a linear one is off by half the square of the angle, a hundredth.
+const EVEN: f64 = 0.99;
+const BENT: f64 = 0.85;
+
 /// All of a channel, on a page.
 const FULL: u32 = 65535;
 
@@ -63,6 +68,12 @@ pub(crate) fn picture(
         Smoothness::Fine => shot::draw(&raster::SIXTEEN, threads, &stage, &lens, &lighting),
         Smoothness::Quick => shot::draw(&raster::FOUR, threads, &stage, &lens, &lighting),
     }
+}
+
+/// The strength of light at the corners of a triangle; and half-way from each to the next, if that is not about the mean.
+pub(crate) struct CornerLight {
+    pub(crate) at: [f64; 3],
+    pub(crate) between: Option<[f64; 3]>,
 }
 
 /// Triangles in pixels, and the light on them.
@@ -162,9 +173,7 @@ impl<'m> Lit<'m> {
     /// is lit.
     pub(crate) fn strength(&self, n: usize, weights: [f64; 3]) -> f64 {
         let face = &self.mesh.faces[n];
-        let [p, q, r] = face.corners.map(|(vertex, _)| self.places[vertex as usize]);
-        // Pixels go down.
-        let facing = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0;
+        let facing = self.is_facing(n);
         let (mut normal, mut seen) = (Vector::zeros(), Vector::zeros());
         for (k, weight) in weights.into_iter().enumerate() {
             let (vertex, at) = face.corners[k];
@@ -176,6 +185,56 @@ impl<'m> Lit<'m> {
         }
         let normal = normal.try_normalize(1e-12).unwrap_or_else(Vector::z) * if facing { 1.0 } else { -1.0 };
         self.lighting.strength(&Spot { normal, seen: Point::from(seen), is_thin: face.is_thin })
+    }
+
+    /// The numbers of triangles and of normals.
+    pub(crate) fn counts(&self) -> [usize; 2] {
+        [self.mesh.faces.len(), self.normals.len()]
+    }
+
+    /// The strength of light at the corners of a triangle, and what is needed to tell it between them; `None` unless they are turned about the same way.
+    /// What is known `by_normal`, on its front and on its back, is not reckoned again.
+    pub(crate) fn at_corners(&self, n: usize, by_normal: &mut [[f64; 2]]) -> Option<CornerLight> {
+        let light = self.lighting.lamp()?;
+        let face = &self.mesh.faces[n];
+        if self.floor == Some(face.material) {
+            return None;
+        }
+        let normals = face.corners.map(|(_, at)| self.normals[at as usize]);
+        let square = |i: usize, k: usize| {
+            let (a, b) = (&normals[i], &normals[k]);
+            let cos = a.dot(b);
+            if cos > 0.0 { cos * cos / (a.norm_squared() * b.norm_squared()) } else { 0.0 }
+        };
+        let least = square(0, 1).min(square(1, 2)).min(square(2, 0));
+        if least.is_nan() || least < BENT * BENT {
+            return None;
+        }
+        let side = usize::from(!self.is_facing(n));
+        let lit = |normal: Vector| {
+            let unit = normal.try_normalize(1e-12).unwrap_or_else(Vector::z);
+            light.of_normal(if side == 0 { unit } else { -unit }, face.is_thin)
+        };
+        let depths = face.corners.map(|(vertex, _)| light.at_depth(self.seen[vertex as usize].z));
+        let at = [0, 1, 2].map(|k| {
+            let known = &mut by_normal[face.corners[k].1 as usize][side];
+            if known.is_nan() {
+                *known = lit(normals[k]);
+            }
+            *known + depths[k]
+        });
+        let between = (least < EVEN * EVEN).then(|| {
+            [(0, 1), (1, 2), (2, 0)]
+                .map(|(i, k)| lit(normals[i] + normals[k]) + (depths[i] + depths[k]) / 2.0)
+        });
+        Some(CornerLight { at, between })
+    }
+
+    /// Whether a triangle is seen from its front.
+    fn is_facing(&self, n: usize) -> bool {
+        let [p, q, r] = self.mesh.faces[n].corners.map(|(vertex, _)| self.places[vertex as usize]);
+        // Pixels go down.
+        (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]) < 0.0
     }
 
     /// The light on the triangles.

@@ -177,7 +177,12 @@ impl<const N: usize> Band<N> {
 }
 
 /// The samples of a mask that are not cut out.
-fn left_of<const N: usize>(cut: &Cut<'_>, mask: u32, [column, row]: [usize; 2], [xs, ys]: &Places<N>) -> u32 {
+pub(super) fn left_of<const N: usize>(
+    cut: &Cut<'_>,
+    mask: u32,
+    [column, row]: [usize; 2],
+    [xs, ys]: &Places<N>,
+) -> u32 {
     let mut left = 0;
     for s in (0..N).filter(|s| mask >> s & 1 == 1) {
         let at = |pixel: usize, step: f32| pixel as f64 + f64::from(step) / STEPS as f64;

@@ -1,16 +1,15 @@
-//! Which triangle is the nearest in pixels, at one sample or at several: for the outlines of visible regions.
+//! Which triangle is the nearest in the middles of pixels: for the outlines of visible regions.
 
 use std::ops::Range;
 
-use super::fragments::{Cover, places};
 use super::plane::Ready;
-use super::{Corner, EQUAL, Pattern, Place, STEPS};
+use super::{Corner, EQUAL, Place, STEPS};
 use crate::mapping::Cut;
 
-/// Eight samples, no two in a row or column.
-pub(crate) const EIGHT: Pattern<8> = [(1, -3), (-1, 3), (5, 1), (-3, -5), (-5, 5), (-7, -1), (3, 7), (7, -7)];
-/// In a rectangle of more pixels than this it is not worth the search whether any is to be drawn.
-const FEW: usize = 256;
+/// Pixels that are worked on at a time.
+const LANES: usize = 4;
+/// The largest side of a small triangle, in steps.
+const SMALL: i64 = 24 * STEPS;
 /// Half a pixel.
 const HALF: i64 = STEPS / 2;
 
@@ -27,12 +26,14 @@ pub(crate) struct Given<C, D> {
     pub(crate) cut: D,
 }
 
-/// Finds the nearest triangle in the middle of each pixel, in rasters that are empty before. Of two at the same depth it is the later.
+/// Finds the nearest triangle in the middle of each pixel, in rasters that are empty before, and of each row the first column and the one after the last in which
+/// there are any. Of two at the same depth it is the later.
 pub(crate) fn in_middles<'c>(
     [width, height]: [usize; 2],
     triangles: &Given<impl Fn(usize) -> [Place; 3], impl Fn(usize) -> Option<Cut<'c>>>,
     mut nearest: Nearest<1>,
-) -> Nearest<1> {
+) -> (Nearest<1>, Vec<[u32; 2]>) {
+    let mut spans = vec![[u32::MAX, 0]; height];
     for number in 0..triangles.count {
         let corners = (triangles.corners)(number);
         // Most are so small that they lie between the middles.
@@ -43,9 +44,14 @@ pub(crate) fn in_middles<'c>(
         }
         let Some(ready) = Ready::new(corners, width, &(0..height)) else { continue };
         let cut = (triangles.cut)(number);
-        nearest.add_middles(number as u32 + 1, &ready, [columns, rows], width, cut.as_ref());
+        if cut.is_none() && is_small(&corners) && columns.len().next_multiple_of(LANES) <= width {
+            nearest.add_small(number as u32 + 1, &ready, [columns, rows], (width, &mut spans));
+            continue;
+        }
+        nearest.add_middles(number as u32 + 1, &ready, [columns, rows], (width, &mut spans), cut.as_ref());
     }
-    nearest
+    spans.iter_mut().filter(|[first, _]| *first == u32::MAX).for_each(|span| *span = [0; 2]);
+    (nearest, spans)
 }
 
 /// The pixels whose middles lie between the coordinates of corners, of so many.
@@ -55,155 +61,102 @@ fn middles(at: [i32; 3], count: usize) -> Range<usize> {
     low.max(0) as usize..high.clamp(0, count as i64) as usize
 }
 
+/// Whether a triangle is so small that the functions of its sides are within 32 bits, and that it takes longer to find its sides row by row than to look at
+/// all pixels around it.
+fn is_small(corners: &[Place; 3]) -> bool {
+    let within = |at: [i32; 3]| {
+        let [low, high] = [at[0].min(at[1]).min(at[2]), at[0].max(at[1]).max(at[2])];
+        i64::from(high) - i64::from(low) <= SMALL
+    };
+    within(corners.map(|corner| corner.x)) && within(corners.map(|corner| corner.y))
+}
+
 impl Nearest<1> {
+    /// Adds a small triangle. It works on several pixels at a time, without branches.
+    fn add_small(
+        &mut self,
+        number: u32,
+        ready: &Ready,
+        [columns, rows]: [Range<usize>; 2],
+        (width, spans): (usize, &mut [[u32; 2]]),
+    ) {
+        let plane = ready.plane;
+        let count = columns.len().next_multiple_of(LANES);
+        // Beside the triangle, nothing changes.
+        let first = columns.start.min(width - count);
+        let ahead = [(first, ready.columns[0]), (rows.start, ready.rows[0])]
+            .map(|(to, from)| STEPS * (to as i64 - from as i64) + HALF);
+        let mut start = ready.sides.map(|[value, a, b]| (value + a * ahead[0] + b * ahead[1]) as i32);
+        let [right, down] = [1, 2].map(|k| ready.sides.map(|side| (side[k] * STEPS) as i32));
+        for row in rows {
+            let mut here = start;
+            (0..3).for_each(|k| start[k] += down[k]);
+            let (mut depth, slope) = plane.along([first, row]);
+            let cells = row * width + first..row * width + first + count;
+            let held = self.numbers[cells.clone()].as_chunks_mut::<LANES>().0;
+            let behind = self.depths[cells].as_chunks_mut::<LANES>().0;
+            for (held, behind) in held.iter_mut().zip(behind) {
+                for k in 0..LANES {
+                    let by = k as i32;
+                    let [p, q, r] = [0, 1, 2].map(|side| here[side] + right[side] * by);
+                    let depth = plane.bounded(depth + slope * by as f32);
+                    // Later ones have greater numbers.
+                    let is_seen = (p | q | r >= 0) & (depth + EQUAL >= behind[k][0]);
+                    let nearest = if depth > behind[k][0] { depth } else { behind[k][0] };
+                    behind[k][0] = if is_seen { nearest } else { behind[k][0] };
+                    held[k][0] = if is_seen { number } else { held[k][0] };
+                }
+                (0..3).for_each(|side| here[side] += right[side] * LANES as i32);
+                depth += slope * LANES as f32;
+            }
+            let [from, end] = &mut spans[row];
+            (*from, *end) = ((*from).min(columns.start as u32), (*end).max(columns.end as u32));
+        }
+    }
+
     fn add_middles(
         &mut self,
         number: u32,
         ready: &Ready,
         [columns, rows]: [Range<usize>; 2],
-        width: usize,
+        (width, spans): (usize, &mut [[u32; 2]]),
         cut: Option<&Cut<'_>>,
     ) {
         let plane = ready.plane;
         let ahead = [(columns.start, ready.columns[0]), (rows.start, ready.rows[0])]
             .map(|(to, from)| STEPS * (to as i64 - from as i64) + HALF);
         let mut start = ready.sides.map(|[value, a, b]| value + a * ahead[0] + b * ahead[1]);
+        let step = ready.sides.map(|side| side[1] * STEPS);
         for row in rows {
             let mut here = start;
             (0..3).for_each(|k| start[k] += ready.sides[k][2] * STEPS);
-            let mut entered = false;
-            for column in columns.clone() {
-                let is_outside = here[0] | here[1] | here[2] < 0;
-                (0..3).for_each(|k| here[k] += ready.sides[k][1] * STEPS);
-                if is_outside {
-                    if entered {
-                        break;
-                    }
-                    continue;
-                }
-                entered = true;
-                if cut.is_some_and(|cut| !cut.is_drawn([column as f64 + 0.5, row as f64 + 0.5])) {
-                    continue;
-                }
-                let depth = plane.sample(plane.at([column, row]), [HALF as f32; 2]);
-                let cell = row * width + column;
-                let ([held], [behind]) = (&mut self.numbers[cell], &mut self.depths[cell]);
+            let mut first = columns.start;
+            while first < columns.end && here[0] | here[1] | here[2] < 0 {
+                (0..3).for_each(|k| here[k] += step[k]);
+                first += 1;
+            }
+            let line = row * width;
+            let mut column = first;
+            let (mut next, right) = plane.along([first, row]);
+            while column < columns.end && here[0] | here[1] | here[2] >= 0 {
+                (0..3).for_each(|k| here[k] += step[k]);
+                let is_cut = cut.is_some_and(|cut| !cut.is_drawn([column as f64 + 0.5, row as f64 + 0.5]));
+                let depth = plane.bounded(next);
+                next += right;
+                let ([held], [behind]) = (&mut self.numbers[line + column], &mut self.depths[line + column]);
                 // Later ones have greater numbers.
-                if depth + EQUAL >= *behind {
+                if depth + EQUAL >= *behind && !is_cut {
                     *behind = if depth > *behind { depth } else { *behind };
                     *held = number;
                 }
+                column += 1;
+            }
+            if column > first {
+                let [from, end] = &mut spans[row];
+                (*from, *end) = ((*from).min(first as u32), (*end).max(column as u32));
             }
         }
     }
-}
-
-/// Finds the nearest triangle at each sample of the pixels that have a `place` below `count`. Of two at the same depth it is the later.
-/// Triangles that are known to be `seen` come first, so that most others are hidden by then.
-pub(crate) fn at_samples<'c, const N: usize>(
-    pattern: &Pattern<N>,
-    size: [usize; 2],
-    triangles: &Given<impl Fn(usize) -> [Place; 3], impl Fn(usize) -> Option<Cut<'c>>>,
-    (count, place): (usize, impl Fn(usize) -> usize),
-    seen: impl Fn(usize) -> bool,
-) -> Nearest<N> {
-    let mut nearest = Nearest { numbers: vec![[0; N]; count], depths: vec![[f32::NEG_INFINITY; N]; count] };
-    let Given { corners, cut, .. } = triangles;
-    for number in (0..triangles.count).filter(|number| seen(*number)) {
-        nearest.add(pattern, size, (number, corners(number), || cut(number)), &place, |_, _| true);
-    }
-    let farthest = |depths: &[f32; N]| depths.iter().copied().fold(f32::INFINITY, f32::min);
-    let far: Vec<f32> = nearest.depths.iter().map(farthest).collect();
-    let is_open = |place: usize, depth: f32| far.get(place).is_some_and(|far| depth + EQUAL >= *far);
-    for number in (0..triangles.count).filter(|number| !seen(*number)) {
-        nearest.add(pattern, size, (number, corners(number), || cut(number)), &place, is_open);
-    }
-    nearest
-}
-
-impl<const N: usize> Nearest<N> {
-    /// Adds a triangle where it is in front. `is_open` tells whether something at this depth may be seen at a place.
-    fn add<'c>(
-        &mut self,
-        pattern: &Pattern<N>,
-        [width, height]: [usize; 2],
-        (number, corners, cut): (usize, [Place; 3], impl FnOnce() -> Option<Cut<'c>>),
-        place: impl Fn(usize) -> usize,
-        is_open: impl Fn(usize, f32) -> bool,
-    ) {
-        let front = corners[0].depth.max(corners[1].depth).max(corners[2].depth);
-        let count = self.numbers.len();
-        let is_drawn = |cell: usize| {
-            let at = place(cell);
-            at < count && is_open(at, front)
-        };
-        if !touches(&corners, [width, height], is_drawn) {
-            return;
-        }
-        let Some(Ready { columns, rows, sides, plane }) = Ready::new(corners, width, &(0..height)) else {
-            return;
-        };
-        let cut = cut();
-        let samples = places(pattern);
-        let mut cover: Option<Cover<N>> = None;
-        // What the samples of a pixel add to a side's function at most.
-        let most = sides.map(|[_, a, b]| (a.max(0) + b.max(0)) * STEPS);
-        let number = number as u32 + 1;
-        let mut start = sides.map(|side| side[0]);
-        for row in rows[0]..=rows[1] {
-            let mut corner = start;
-            (0..3).for_each(|k| start[k] += sides[k][2] * STEPS);
-            let mut entered = false;
-            for column in columns[0]..=columns[1] {
-                let here = corner;
-                (0..3).for_each(|k| corner[k] += sides[k][1] * STEPS);
-                if (here[0] + most[0]) | (here[1] + most[1]) | (here[2] + most[2]) < 0 {
-                    if entered {
-                        break;
-                    }
-                    continue;
-                }
-                entered = true;
-                let place = place(row * width + column);
-                if place >= count || !is_open(place, front) {
-                    continue;
-                }
-                let mut left = cover.get_or_insert_with(|| Cover::new(&sides, &samples)).mask(here);
-                let (numbers, depths) = (&mut self.numbers[place], &mut self.depths[place]);
-                let base = plane.at([column, row]);
-                while left != 0 {
-                    let s = left.trailing_zeros() as usize;
-                    left &= left - 1;
-                    let at = [samples[0][s], samples[1][s]];
-                    let step = 1.0 / STEPS as f64;
-                    let whole =
-                        || [column as f64 + f64::from(at[0]) * step, row as f64 + f64::from(at[1]) * step];
-                    if cut.as_ref().is_some_and(|cut| !cut.is_drawn(whole())) {
-                        continue;
-                    }
-                    let depth = plane.sample(base, at);
-                    let is_later = number > numbers[s];
-                    if depth > depths[s] + EQUAL || is_later && depth + EQUAL >= depths[s] {
-                        depths[s] = if depth > depths[s] { depth } else { depths[s] };
-                        numbers[s] = number;
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// Whether a triangle may touch a pixel that is to be drawn. Most of the small ones do not.
-fn touches(corners: &[Place; 3], [width, height]: [usize; 2], is_drawn: impl Fn(usize) -> bool) -> bool {
-    let range = |at: [i32; 3], count: usize| {
-        let low = i64::from(at[0].min(at[1]).min(at[2])).div_euclid(STEPS);
-        let high = i64::from(at[0].max(at[1]).max(at[2])).div_euclid(STEPS) + 1;
-        low.max(0) as usize..high.clamp(0, count as i64) as usize
-    };
-    let columns = range(corners.each_ref().map(|corner| corner.x), width);
-    let mut rows = range(corners.each_ref().map(|corner| corner.y), height);
-    columns.len() * rows.len() > FEW
-        || rows.any(|row| columns.clone().any(|column| is_drawn(row * width + column)))
 }
 
 /// The weights of a triangle's corners in the middle of a pixel, or near it if that is outside.
@@ -215,4 +168,51 @@ pub(crate) fn weights([p, q, r]: [Corner; 3], [column, row]: [usize; 2]) -> [f64
     let inner = raw.map(|w| (w / area).max(0.0));
     let sum: f64 = inner.iter().sum();
     if sum.is_finite() && sum > 0.0 { inner.map(|w| w / sum) } else { [1.0 / 3.0; 3] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_triangles_are_where_large_ones_would_be() {
+        let (width, height) = (40, 30);
+        let mut state = 7_u64;
+        let mut random = |most: f64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 * most
+        };
+        let empty = || Nearest {
+            numbers: vec![[0]; width * height],
+            depths: vec![[f32::NEG_INFINITY]; width * height],
+        };
+        for round in 0..100 {
+            let triangles: Vec<[Place; 3]> = (0..60)
+                .map(|_| {
+                    let (x, y) = (random(44.0) - 4.0, random(34.0) - 4.0);
+                    [(); 3].map(|()| {
+                        Corner { x: x + random(9.0), y: y + random(9.0), depth: random(1.0) }.place()
+                    })
+                })
+                .collect();
+            let given = Given { count: triangles.len(), corners: |n: usize| triangles[n], cut: |_| None };
+            let (found, spans) = in_middles([width, height], &given, empty());
+            let mut plain = empty();
+            let mut rows = vec![[u32::MAX, 0]; height];
+            for (number, &corners) in (1..).zip(&triangles) {
+                assert!(is_small(&corners));
+                let Some(ready) = Ready::new(corners, width, &(0..height)) else { continue };
+                let both = [middles(corners.map(|p| p.x), width), middles(corners.map(|p| p.y), height)];
+                plain.add_middles(number, &ready, both, (width, &mut rows), None);
+            }
+            // At depths that are equal but for rounding, the two may differ.
+            let differing = found.numbers.iter().zip(&plain.numbers).filter(|(a, b)| a != b).count();
+            assert!(differing <= 1, "round {round}: {differing} pixels differ");
+            for (row, [first, end]) in spans.iter().enumerate() {
+                let line = &found.numbers[row * width..][..width];
+                let is_within = |column: usize| (*first as usize..*end as usize).contains(&column);
+                assert!((0..width).all(|column| line[column] == [0] || is_within(column)), "round {round}");
+            }
+        }
+    }
 }

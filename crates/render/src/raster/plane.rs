@@ -25,6 +25,11 @@ impl Plane {
         self.depth + self.right * (column as f32 - self.column) + self.down * (row as f32 - self.row)
     }
 
+    /// The depth in the middle of a pixel, which is yet to be bounded, and its growth to the right.
+    pub(super) fn along(&self, pixel: [usize; 2]) -> (f32, f32) {
+        (self.at(pixel) + 0.5 * (self.right + self.down), self.right)
+    }
+
     /// The least and the greatest that a sample adds, or less and more.
     pub(super) fn reach(&self) -> [f32; 2] {
         let range = |slope: f32| if slope < 0.0 { [slope, 0.0] } else { [0.0, slope] };

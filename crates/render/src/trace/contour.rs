@@ -202,18 +202,24 @@ fn simplified(points: &[Place]) -> Vec<Corner> {
     while let Some((from, to)) = stretches.pop() {
         let (p, q) = (points[from % n].at, points[to % n].at);
         let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
-        let length = dx.hypot(dy);
-        // In tolerances.
-        let offset = |i: usize| {
-            let Place { at: [x, y], tolerance } = points[i % n];
-            let (ex, ey) = (x - p[0], y - p[1]);
-            let distance = if length > 0.0 { (ex * dy - ey * dx).abs() / length } else { ex.hypot(ey) };
-            distance / tolerance
+        let square = dx * dx + dy * dy;
+        // The square of the distance, in tolerances.
+        let offset = |place: &Place| {
+            let (ex, ey) = (place.at[0] - p[0], place.at[1] - p[1]);
+            let distance =
+                if square > 0.0 { (ex * dy - ey * dx).powi(2) / square } else { ex * ex + ey * ey };
+            distance / (place.tolerance * place.tolerance)
         };
-        let worst = (from + 1..to).map(|i| (i, offset(i))).max_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((worst, _)) = worst.filter(|(_, offset)| *offset > 1.0) {
-            kept[worst % n] = true;
-            stretches.extend([(from, worst), (worst, to)]);
+        let mut worst = (from, 1.0);
+        for i in from + 1..to {
+            let off = offset(&points[if i < n { i } else { i - n }]);
+            if off > worst.1 {
+                worst = (i, off);
+            }
+        }
+        if worst.0 != from {
+            kept[worst.0 % n] = true;
+            stretches.extend([(from, worst.0), (worst.0, to)]);
         }
     }
     let corners: Vec<usize> = (0..n).filter(|i| kept[*i]).collect();

@@ -1,20 +1,28 @@
 //! The region of each cell of a raster: the module, the material and the shade of the nearest triangle there.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
-use super::memory::{Rasters, filled};
-use super::regions::{COVERED, NOTHING, Regions, Sample};
+use rustc_hash::FxHashMap;
+
+use super::edges::{self, AtEdges, FaceItem};
+use super::memory::{Rasters, empty};
+use super::regions::{COVERED, NOTHING, Regions};
 use super::scarce;
+use super::shading::Shading;
+use super::spans::Spans;
 use super::tones::{MOST, Tones};
 use crate::formats::png::Lit;
+use crate::raster::SIXTEEN;
 use crate::raster::cells::{self, Given, Nearest};
-use crate::raster::{Pattern, SIXTEEN};
-use crate::triangles::Triangles;
+use crate::raster::samples::EIGHT;
+use crate::triangles::{Triangle, Triangles};
 use dlsys_geometry::scene::{MaterialId, OwnerId};
 
 /// Shades between black and a colour as it is; and of what is so large in the picture that the steps between shades would show.
-const SHADES: u8 = 20;
+pub const SHADES: u8 = 20;
 const FINE_SHADES: u8 = 60;
+/// No step is below this.
+const DARKEST: i32 = -256;
 /// What covers so many pixels is large.
 const LARGE: f64 = 10_000.0;
 /// Of so many rows and columns one each is looked at to tell what is large, and what is less wide than so many of those is not: in gaps between
@@ -66,7 +74,7 @@ pub struct Item {
     pub stem: Option<u32>,
     pub tone: u8,
     /// Shades between black and the colour as it is.
-    shades: u8,
+    pub shades: u8,
 }
 
 impl Item {
@@ -76,8 +84,10 @@ impl Item {
     }
 
     /// The shade of a strength of light.
-    fn step(&self, strength: f64) -> i32 {
-        (strength * f64::from(self.shades)).round() as i32
+    pub fn step(&self, strength: f64) -> i32 {
+        // Not below 0, so that a cut rounds down.
+        let above = strength * f64::from(self.shades) - f64::from(DARKEST) + 0.5;
+        (above as i32).max(0) + DARKEST
     }
 }
 
@@ -101,64 +111,59 @@ impl Stems {
     }
 }
 
-/// The number of the nearest triangle in the middle of each cell plus 1, or 0; and its depth.
-pub fn nearest(mesh: &Triangles, lit: &Lit, size: [usize; 2], rasters: &mut Rasters) -> Nearest<1> {
-    let cells = size[0] * size[1];
-    let numbers = filled(&mut rasters.numbers, cells, [0]);
-    let empty = Nearest { numbers, depths: filled(&mut rasters.depths, cells, [f32::NEG_INFINITY]) };
-    cells::in_middles(
-        size,
-        &Given { count: mesh.faces.len(), corners: |n| lit.snapped(n), cut: |n| lit.cut(n, 1) },
-        empty,
-    )
+/// What the middles of cells show: the triangles, their light, and where in the raster they are.
+#[derive(Clone, Copy)]
+pub struct Seen<'a> {
+    pub mesh: &'a Triangles,
+    pub lit: &'a Lit<'a>,
+    /// The number of the nearest triangle plus 1, or 0.
+    pub numbers: &'a [[u32; 1]],
+    pub size: [usize; 2],
+    /// Where there are triangles, and that with the cells around.
+    pub spans: &'a Spans,
+    pub around: &'a Spans,
+}
+
+/// The number of the nearest triangle in the middle of each cell plus 1, or 0, and its depth; and where there are triangles. Memory is for `most`
+/// cells, if there are no more.
+pub fn nearest(
+    mesh: &Triangles,
+    lit: &Lit,
+    (size, most): ([usize; 2], usize),
+    rasters: &mut Rasters,
+) -> (Nearest<1>, Spans) {
+    let room = [size[0] * size[1], most];
+    let numbers = empty(&mut rasters.numbers, room, [0]);
+    let nothing = Nearest { numbers, depths: empty(&mut rasters.depths, room, [f32::NEG_INFINITY]) };
+    let triangles = Given { count: mesh.faces.len(), corners: |n| lit.snapped(n), cut: |n| lit.cut(n, 1) };
+    let (nearest, rows) = cells::in_middles(size, &triangles, nothing);
+    (nearest, Spans::new(size[0], rows))
 }
 
 /// The raster of regions, and their shades by number. Regions are painted in the order of modules, materials and shades.
 /// A pixel of the page is so many cells; of cells finer than pixels edges have fewer samples.
 pub fn label(
-    mesh: &Triangles,
-    lit: &Lit,
-    numbers: &[[u32; 1]],
-    [width, height]: [usize; 2],
+    seen: Seen,
     (stems, tones): (&Stems, &Tones),
     (is_fine, per_pixel): (bool, f64),
+    most: usize,
     rasters: &mut Rasters,
 ) -> (Regions, Vec<Shade>) {
-    // Regions are numbered as they are found, then in the order of painting.
-    let mut shades: Vec<Shade> = Vec::new();
-    let mut known: HashMap<(Item, i32), u32> = HashMap::new();
-    let mut last = None;
-    let mut labels = filled(&mut rasters.labels, numbers.len(), NOTHING);
-    let mut item_of: Vec<Option<Item>> = (0..mesh.faces.len()).map(|n| stems.item(mesh, n)).collect();
-    shade_finely(mesh, &mut item_of, numbers, width, (per_pixel * LARGE) as usize);
-    let has_shades = |n: usize| item_of[n].is_some_and(|item| item.stem.is_none());
-    let strengths = filled(&mut rasters.strengths, numbers.len(), 0.0);
-    let strengths = lit_cells(lit, numbers, width, has_shades, strengths);
-    for (cell, label) in labels.iter_mut().enumerate() {
-        let Some(n) = (numbers[cell][0] as usize).checked_sub(1) else { continue };
-        let Some(mut item) = item_of[n] else {
-            *label = COVERED;
-            continue;
-        };
-        let weights = || cells::weights(lit.corners(n), [cell % width, cell / width]);
-        if let Some(color) = lit.pictured(n, weights) {
-            item.tone = tones.nearest(item.look.1, color);
-        }
-        let strength = f64::from(strengths[cell]);
-        let step = item.step(strength);
-        let key = (item, step);
-        let number = match last {
-            Some((same, number)) if same == key => number,
-            _ => *known.entry(key).or_insert_with(|| {
-                shades.push(Shade::new(item, step, 0.0, 0));
-                shades.len() as u32 - 1
-            }),
-        };
-        last = Some((key, number));
-        let shade = &mut shades[number as usize];
-        (shade.sum, shade.count) = (shade.sum + strength, shade.count + 1);
-        *label = number;
-    }
+    let Seen { mesh, numbers, around, size: [width, _], .. } = seen;
+    let room = [numbers.len(), most];
+    let mut item_of = items_of(mesh, stems);
+    shade_finely(mesh, &mut item_of, numbers, seen.spans, (per_pixel * LARGE) as usize);
+    let mut shading = Shading::new(seen.lit);
+    let mut cells = Cells {
+        labels: empty(&mut rasters.labels, room, NOTHING),
+        strengths: empty(&mut rasters.strengths, room, 0.0),
+        shades: Vec::new(),
+        items: FxHashMap::default(),
+        last: None,
+        tables: Vec::new(),
+    };
+    cells.fill(seen, &item_of, tones, &mut shading);
+    let Cells { mut labels, strengths, mut shades, .. } = cells;
     clear_rim(&mut labels, width);
     let mut order: Vec<u32> = (0..shades.len() as u32).collect();
     order.sort_by_key(|number| shades[*number as usize].key());
@@ -166,38 +171,137 @@ pub fn label(
     let (shades, of_shade) = scarce::merged(shades, per_pixel);
     let mut ranks = vec![0; order.len()];
     order.iter().zip(of_shade).for_each(|(number, rank)| ranks[*number as usize] = rank);
-    labels.iter_mut().filter(|label| **label < COVERED).for_each(|label| *label = ranks[*label as usize]);
+    for cells in seen.spans.cells() {
+        let labels = labels[cells].iter_mut().filter(|label| **label < COVERED);
+        labels.for_each(|label| *label = ranks[*label as usize]);
+    }
 
     let (items, of_item) = items(&shades);
-    let empty = filled(&mut rasters.places, labels.len(), 0);
-    let (places, chosen) = edges(&labels, &items, &shades, width, empty);
-    let at_edges =
-        Edges { lit, numbers, width, height, places: &places, count: chosen, tones, of_item: &of_item };
-    // Faces of one item follow one another.
-    let mut last = (None, NOTHING);
-    let face_items: Vec<FaceItem> = (item_of.iter())
-        .map(|item| {
-            let Some(known) = item else {
-                return FaceItem { item: None, number: COVERED, has_shades: false };
-            };
-            if last.0 != *item {
-                // Of a picture any tone that there is.
-                let mut toned = (0..MOST as u8).map(|tone| of_item.get(&Item { tone, ..*known }));
-                last = (*item, toned.find_map(|number| number.copied()).unwrap_or(NOTHING));
-            }
-            FaceItem { item: *item, number: last.1, has_shades: known.stem.is_none() }
-        })
-        .collect();
+    let nothing = empty(&mut rasters.places, room, 0);
+    let (places, edge_cells) = edges::found(&labels, &items, &shades, (width, around), nothing);
+    let at_edges = AtEdges { seen, places: &places, cells: &edge_cells, tones, of_item: &of_item };
+    let face_items = face_items(&item_of, &of_item);
     let samples = match is_fine {
-        true => at_edges.samples(&cells::EIGHT, &face_items),
-        false => at_edges.samples(&SIXTEEN, &face_items),
+        true => at_edges.samples(&EIGHT, &face_items, &mut shading),
+        false => at_edges.samples(&SIXTEEN, &face_items, &mut shading),
     };
-    let per_cell = if is_fine { cells::EIGHT.len() } else { SIXTEEN.len() };
+    let per_cell = if is_fine { EIGHT.len() } else { SIXTEEN.len() };
     let least =
         shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / f64::from(shade.item.shades)).collect();
     let steps = shades.iter().map(|shade| shade.step).collect();
     let means = shades.iter().map(Shade::strength).collect();
-    (Regions { width, labels, places, samples, per_cell, items, steps, strengths, least, means }, shades)
+    let around = around.clone();
+    let regions = Regions {
+        width,
+        around,
+        labels,
+        places,
+        edge_cells,
+        samples,
+        per_cell,
+        items,
+        steps,
+        strengths,
+        least,
+        means,
+    };
+    (regions, shades)
+}
+
+/// The item of each triangle, without its tone. Those of a surface follow one another.
+fn items_of(mesh: &Triangles, stems: &Stems) -> Vec<Option<Item>> {
+    let mut items = Vec::with_capacity(mesh.faces.len());
+    let key = |face: &Triangle| (face.surface, face.owner, face.material);
+    for run in mesh.faces.chunk_by(|a, b| key(a) == key(b)) {
+        let item = stems.item(mesh, items.len());
+        items.resize(items.len() + run.len(), item);
+    }
+    items
+}
+
+/// Cells as they are given their regions, which are numbered as they are found.
+struct Cells {
+    labels: Vec<u32>,
+    strengths: Vec<f32>,
+    shades: Vec<Shade>,
+    /// By item: the number of its table, and of the last item; a table has the number of each shade from the darkest on, plus 1, or 0.
+    items: FxHashMap<Item, usize>,
+    last: Option<(Item, usize)>,
+    tables: Vec<Vec<u32>>,
+}
+
+impl Cells {
+    fn fill(&mut self, seen: Seen, items: &[Option<Item>], tones: &Tones, shading: &mut Shading) {
+        let width = seen.size[0];
+        for cells in seen.spans.cells() {
+            let row = cells.start / width;
+            let mut cell = cells.start;
+            for run in seen.numbers[cells].chunk_by(|a, b| a == b) {
+                let (first, n) = (cell, (run[0][0] as usize).wrapping_sub(1));
+                cell += run.len();
+                match items.get(n) {
+                    None => {}
+                    Some(None) => self.labels[first..cell].fill(COVERED),
+                    Some(Some(item)) => {
+                        let first = [first - row * width, row];
+                        self.fill_run(seen, (n, *item), (first, run.len()), tones, shading);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Labels so many cells, from the first one on, that show one triangle.
+    fn fill_run(
+        &mut self,
+        seen: Seen,
+        (n, mut item): (usize, Item),
+        ([first, row], count): ([usize; 2], usize),
+        tones: &Tones,
+        shading: &mut Shading,
+    ) {
+        let has_shades = item.stem.is_none();
+        let even = if has_shades { shading.even(n) } else { None };
+        for column in first..first + count {
+            let at = [column, row];
+            let weights = || cells::weights(seen.lit.corners(n), at);
+            if let Some(color) = seen.lit.pictured(n, weights) {
+                item.tone = tones.nearest(item.look.1, color);
+            }
+            let strength = match even {
+                Some(even) => even.at(at).into(),
+                None if has_shades => shading.uneven(n, at),
+                None => 0.0,
+            };
+            let number = self.number(item, item.step(strength));
+            let shade = &mut self.shades[number as usize];
+            (shade.sum, shade.count) = (shade.sum + strength, shade.count + 1);
+            let cell = row * seen.size[0] + column;
+            (self.labels[cell], self.strengths[cell]) = (number, strength as f32);
+        }
+    }
+
+    /// The number of a shade of an item.
+    fn number(&mut self, item: Item, step: i32) -> u32 {
+        let table = match self.last.filter(|(last, _)| *last == item) {
+            Some((_, table)) => table,
+            None => *self.items.entry(item).or_insert_with(|| {
+                self.tables.push(Vec::new());
+                self.tables.len() - 1
+            }),
+        };
+        self.last = Some((item, table));
+        let table = &mut self.tables[table];
+        let at = (step - DARKEST) as usize;
+        if at >= table.len() {
+            table.resize(at + 1, 0);
+        }
+        if table[at] == 0 {
+            self.shades.push(Shade::new(item, step, 0.0, 0));
+            table[at] = self.shades.len() as u32;
+        }
+        table[at] - 1
+    }
 }
 
 /// Gives more shades to the looks of surfaces that cover more than so many cells each. Triangles of one look follow one another, and so do
@@ -206,16 +310,16 @@ fn shade_finely(
     mesh: &Triangles,
     items: &mut [Option<Item>],
     numbers: &[[u32; 1]],
-    width: usize,
+    seen: &Spans,
     large: usize,
 ) {
     let mut covered = vec![0; items.len() + 1];
     // Nothing is no surface.
     let surface = |number: u32| Some(mesh.faces[(number as usize).checked_sub(1)?].surface);
     let mut run: Vec<u32> = Vec::new();
-    for row in numbers.chunks(width).step_by(APART) {
+    for row in seen.cells().step_by(APART) {
         run.clear();
-        run.extend(row.iter().step_by(APART).map(|[number]| *number));
+        run.extend(numbers[row].iter().step_by(APART).map(|[number]| *number));
         let wide = run.chunk_by(|a, b| surface(*a) == surface(*b)).filter(|run| run.len() >= WIDE);
         wide.flatten().for_each(|number| covered[*number as usize] += APART * APART);
     }
@@ -234,74 +338,23 @@ fn shade_finely(
     }
 }
 
-/// The item of a triangle without its tone, the number of that with some tone, and whether it has shades.
-struct FaceItem {
-    item: Option<Item>,
-    number: u32,
-    has_shades: bool,
-}
-
-/// Cells at the edges of items and at creases: those that have a place, from 1 to `count`.
-struct Edges<'a> {
-    lit: &'a Lit<'a>,
-    /// The nearest triangle in the middle of each cell, by number plus 1.
-    numbers: &'a [[u32; 1]],
-    width: usize,
-    height: usize,
-    places: &'a [u32],
-    count: usize,
-    tones: &'a Tones,
-    of_item: &'a HashMap<Item, u32>,
-}
-
-impl Edges<'_> {
-    /// What is seen at the samples of these cells, one cell after another.
-    fn samples<const N: usize>(&self, pattern: &Pattern<N>, items: &[FaceItem]) -> Vec<Sample> {
-        // Cells without a place come after all others.
-        let place = |cell: usize| (self.places[cell] as usize).wrapping_sub(1);
-        let corners = |n: usize| self.lit.corners(n);
-        let mut in_front = vec![false; items.len() + 1];
-        self.numbers.iter().for_each(|[number]| in_front[*number as usize] = true);
-        let triangles =
-            Given { count: items.len(), corners: |n| self.lit.snapped(n), cut: |n| self.lit.cut(n, N) };
-        let size = [self.width, self.height];
-        let seen =
-            cells::at_samples(pattern, size, &triangles, (self.count, place), |n| in_front[n + 1]).numbers;
-        let sample = |number: u32, cell: usize| {
-            let Some(n) = (number as usize).checked_sub(1) else { return Sample { item: NOTHING, step: 0 } };
-            let FaceItem { number: item, has_shades, .. } = items[n];
-            if item >= COVERED || !has_shades {
-                return Sample { item, step: 0 };
+/// By triangle: its item, as edges see it.
+fn face_items(item_of: &[Option<Item>], of_item: &FxHashMap<Item, u32>) -> Vec<FaceItem> {
+    let mut items = Vec::with_capacity(item_of.len());
+    // Faces of one item follow one another.
+    for run in item_of.chunk_by(|a, b| a == b) {
+        let item = match run[0] {
+            None => FaceItem { item: None, number: COVERED, has_shades: false },
+            Some(known) => {
+                // Of a picture any tone that there is.
+                let mut toned = (0..MOST as u8).map(|tone| of_item.get(&Item { tone, ..known }));
+                let number = toned.find_map(|number| number.copied()).unwrap_or(NOTHING);
+                FaceItem { item: run[0], number, has_shades: known.stem.is_none() }
             }
-            let weights = cells::weights(corners(n), [cell % self.width, cell / self.width]);
-            let strength = self.lit.strength(n, weights);
-            let step = items[n].item.map_or(0, |item| item.step(strength));
-            Sample { item: self.toned(n, &items[n], weights), step }
         };
-        let mut samples = Vec::with_capacity(self.count * N);
-        let mut known: Vec<(u32, Sample)> = Vec::with_capacity(N);
-        let cells = (0..self.places.len()).filter(|cell| place(*cell) < self.count);
-        for (cell, numbers) in cells.zip(&seen) {
-            known.clear();
-            samples.extend(numbers.map(|number| match known.iter().find(|known| known.0 == number) {
-                Some(&(_, sample)) => sample,
-                None => {
-                    known.push((number, sample(number, cell)));
-                    known[known.len() - 1].1
-                }
-            }));
-        }
-        samples
+        items.resize(items.len() + run.len(), item);
     }
-}
-
-impl Edges<'_> {
-    /// The number of the item of a triangle at a place between its corners: of those of its tones that there are the nearest.
-    fn toned(&self, n: usize, own: &FaceItem, weights: [f64; 3]) -> u32 {
-        let Some((item, color)) = own.item.zip(self.lit.pictured(n, || weights)) else { return own.number };
-        let tone = self.tones.nearest(item.look.1, color);
-        self.of_item.get(&Item { tone, ..item }).copied().unwrap_or(own.number)
-    }
+    items
 }
 
 /// Leaves the cells around a raster empty: none of them is in the picture.
@@ -314,91 +367,13 @@ fn clear_rim(labels: &mut [u32], width: usize) {
     labels[..width].fill(NOTHING);
 }
 
-/// The strengths of light in the middles of cells whose triangles have shades; they are 0 before. Between two cells of one triangle it is their mean.
-fn lit_cells(
-    lit: &Lit,
-    numbers: &[[u32; 1]],
-    width: usize,
-    has_shades: impl Fn(usize) -> bool,
-    mut strengths: Vec<f32>,
-) -> Vec<f32> {
-    let height = numbers.len() / width.max(1);
-    // Rows with even numbers first, then those between.
-    for first in [0, 1] {
-        for y in (first..height).step_by(2) {
-            let apart = if first == 0 { 1 } else { width };
-            for offset in [0, 1] {
-                // Of an even row every second cell lies between two; of an odd row all do.
-                for x in (offset..width).step_by(2) {
-                    let cell = y * width + x;
-                    let n = numbers[cell][0];
-                    if n == 0 || !has_shades(n as usize - 1) {
-                        continue;
-                    }
-                    let is_between = match first {
-                        0 => offset == 1 && x + 1 < width,
-                        _ => y + 1 < height,
-                    };
-                    let both = is_between && numbers[cell - apart][0] == n && numbers[cell + apart][0] == n;
-                    strengths[cell] = match both {
-                        true => (strengths[cell - apart] + strengths[cell + apart]) / 2.0,
-                        false => {
-                            let n = n as usize - 1;
-                            lit.strength(n, cells::weights(lit.corners(n), [x, y])) as f32
-                        }
-                    };
-                }
-            }
-        }
-    }
-    strengths
-}
-
 /// The item (module and material) of each region, by number in the order of painting; and the number of each item.
-fn items(shades: &[Shade]) -> (Vec<u32>, HashMap<Item, u32>) {
-    let mut numbers: HashMap<Item, u32> = HashMap::new();
+fn items(shades: &[Shade]) -> (Vec<u32>, FxHashMap<Item, u32>) {
+    let mut numbers: FxHashMap<Item, u32> = FxHashMap::default();
     let number = |shade: &Shade| {
         let next = numbers.len() as u32;
         *numbers.entry(shade.item).or_insert(next)
     };
     let items = shades.iter().map(number).collect();
     (items, numbers)
-}
-
-/// For each cell beside one of another item, or of a shade that is not the next one, its number among these cells from 1 on, else 0; and their
-/// count.
-fn edges(
-    labels: &[u32],
-    items: &[u32],
-    shades: &[Shade],
-    width: usize,
-    mut places: Vec<u32>,
-) -> (Vec<u32>, usize) {
-    let item = |label: u32| items.get(label as usize).copied();
-    // As far apart as two of the coarse shades.
-    let is_crease = |p: u32, q: u32| {
-        let both = [p.min(q), p.max(q)].map(|label| shades.get(label as usize));
-        let [Some(dark), Some(light)] = both else { return false };
-        light.step - dark.last > i32::from(dark.item.shades / SHADES)
-    };
-    let mut mark = |a: usize, b: usize| {
-        // Most neighbours are of one region.
-        let [p, q] = [labels[a], labels[b]];
-        if p != q && (item(p) != item(q) || is_crease(p, q)) {
-            (places[a], places[b]) = (1, 1);
-        }
-    };
-    // The cells around the raster are empty, so the first of a row may be compared with the last of the row before.
-    for cell in 1..labels.len() {
-        mark(cell - 1, cell);
-    }
-    for cell in width..labels.len() {
-        mark(cell - width, cell);
-    }
-    let mut count = 0;
-    for place in places.iter_mut().filter(|place| **place != 0) {
-        count += 1;
-        *place = count;
-    }
-    (places, count as usize)
 }

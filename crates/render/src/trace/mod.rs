@@ -15,13 +15,17 @@
 //! under these, too.
 
 mod contour;
+mod edges;
 mod hidden;
 mod label;
 mod memory;
 mod order;
 mod path;
+mod pieces;
 mod regions;
 mod scarce;
+mod shading;
+mod spans;
 mod specks;
 mod stems;
 mod tones;
@@ -42,7 +46,7 @@ use super::tube::{TubeStyle, Tubes, sides_for};
 use contour::Corner;
 use dlsys_geometry::scene::{Face, OwnerId, Point, Scene, Segment};
 use hidden::{Part, Visible};
-use label::{Look, Stems};
+use label::{Look, Seen, Stems};
 pub(super) use memory::Memory;
 use memory::Rasters;
 use path::push_outline;
@@ -109,25 +113,22 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     lit.shift(low);
     let size = size.map(|side| side as usize);
     let mut rasters = style.memory.map(Memory::take).unwrap_or_default();
-    let nearest = label::nearest(&mesh, &lit, size, &mut rasters);
+    let most = if style.memory.is_some() { (whole[0] * whole[1]) as usize } else { 0 };
+    let (nearest, spans) = label::nearest(&mesh, &lit, (size, most), &mut rasters);
+    let around = spans.widened();
     let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };
     let stems = match &plan {
         Some(_) => Stems::default(),
         None => stems(scene, style, &visible, lit.lighting().is_declared()),
     };
     let tones = Tones::of(&scene.palette);
-    let (mut regions, shades) = label::label(
-        &mesh,
-        &lit,
-        &nearest.numbers,
-        size,
-        (&stems, &tones),
-        (is_fine, per_pixel),
-        &mut rasters,
-    );
+    let seen =
+        Seen { mesh: &mesh, lit: &lit, numbers: &nearest.numbers, size, spans: &spans, around: &around };
+    let fineness = (is_fine, per_pixel);
+    let (mut regions, shades) = label::label(seen, (&stems, &tones), fineness, most, &mut rasters);
     regions.with_narrow_parts();
-    regions.without_specks(per_pixel, &mut rasters);
-    let outlines = regions.outlines(shades.len(), &mut rasters);
+    regions.without_specks(per_pixel, &mut rasters.marks);
+    let outlines = regions.outlines(shades.len(), &mut rasters.marks);
     visible.labels = &regions.labels;
 
     let unit = cell * style.scale;
@@ -179,7 +180,8 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     if let Some(memory) = style.memory {
         let Regions { labels, places, strengths, .. } = regions;
         let (numbers, depths) = (nearest.numbers, nearest.depths);
-        memory.keep(Rasters { numbers, depths, labels, places, strengths, ..rasters });
+        let rasters = Rasters { numbers, depths, labels, places, strengths, ..rasters };
+        memory.keep(rasters, [&spans, &around]);
     }
     elements
 }

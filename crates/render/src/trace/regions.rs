@@ -5,7 +5,10 @@
 //! edges would lie over one another; and through holes, so that an outline within another is needed once only. A region is worked on piece by piece (cells that hang together), and the work on a piece is that of its cells.
 
 use super::contour::{Corner, Hidden, Mask, Part};
-use super::memory::{Rasters, filled};
+use super::memory::MarkMemory;
+use super::pieces::Pieces;
+use super::spans::Spans;
+use std::ops::Range;
 
 /// The width of the margin, in cells.
 const MARGIN: usize = 3;
@@ -16,6 +19,8 @@ const WITHIN: f64 = 0.004;
 
 /// No region.
 pub const NOTHING: u32 = u32::MAX;
+/// No cell around has samples.
+pub const NO_SAMPLES: u32 = u32::MAX;
 /// Cells that will be drawn over by something else, so that regions may reach there.
 pub const COVERED: u32 = u32::MAX - 1;
 
@@ -31,10 +36,14 @@ pub struct Sample {
 /// A raster of regions, by number in the order of painting. Nothing is in the cells at its rim.
 pub struct Regions {
     pub width: usize,
+    /// All cells with a region or samples.
+    pub around: Spans,
     /// By cell; [`NOTHING`] for the background, [`COVERED`] where something else is drawn.
     pub labels: Vec<u32>,
     /// By cell: its place among those with `per_cell` samples, from 1 on, if it is at the edge of an item or at a crease; else 0.
     pub places: Vec<u32>,
+    /// These cells.
+    pub edge_cells: Vec<u32>,
     pub samples: Vec<Sample>,
     pub per_cell: usize,
     /// By region: its item (module and material), in the order of painting, and its shade.
@@ -49,28 +58,73 @@ pub struct Regions {
 }
 
 /// Marks on the cells of a raster, a number for each region piece, so that they need not be taken away.
-struct Marks {
+struct Marks<'a> {
     /// The last piece that a cell was found to be in, or is covered by.
-    inside: Vec<u32>,
+    inside: &'a mut [u32],
     /// The last piece an outline of which passed above a cell.
-    begun: Vec<u32>,
+    begun: &'a mut [u32],
     /// The last hole that a cell was seen in.
-    seen: Vec<u32>,
+    seen: &'a mut [u32],
     holes: u32,
+}
+
+/// Where the samples of cells at edges come in the order of painting.
+struct Ranks<'a> {
+    per_cell: usize,
+    all: Vec<u64>,
+    /// By cell: the first item that is seen in it or in those around it, plus 1, as far as there are samples; or 0 if something is open.
+    first: &'a mut [u32],
+}
+
+/// Where a shade of an item comes in the order of painting: after 0, which is nothing.
+fn rank(item: u32, step: i32) -> u64 {
+    (u64::from(item) + 1) << 32 | u64::from(step as u32 ^ 1 << 31)
+}
+
+impl<'a> Ranks<'a> {
+    /// `first` is of a raster in which no cell has samples.
+    fn of(regions: &Regions, first: &'a mut [u32]) -> Ranks<'a> {
+        let of = |sample: &Sample| if sample.item == NOTHING { 0 } else { rank(sample.item, sample.step) };
+        let all: Vec<u64> = regions.samples.iter().map(of).collect();
+        for (cell, ranks) in regions.edge_cells.iter().zip(all.chunks_exact(regions.per_cell)) {
+            let least = (ranks.iter().fold(u64::MAX, |a, b| a.min(*b)) >> 32) as u32;
+            for near in regions.cross(*cell as usize) {
+                if let Some(first) = first.get_mut(near) {
+                    *first = least.min(*first);
+                }
+            }
+        }
+        Ranks { per_cell: regions.per_cell, all, first }
+    }
+
+    /// Takes the samples away.
+    fn clear(self, regions: &Regions) {
+        for cell in regions.edge_cells.iter().flat_map(|cell| regions.cross(*cell as usize)) {
+            if let Some(first) = self.first.get_mut(cell) {
+                *first = NO_SAMPLES;
+            }
+        }
+    }
+
+    /// The part of the samples of a cell that comes no earlier.
+    fn part(&self, place: u32, least: u64) -> f64 {
+        let first = (place as usize - 1) * self.per_cell;
+        let samples = &self.all[first..first + self.per_cell];
+        samples.iter().map(|rank| u32::from(*rank >= least)).sum::<u32>() as f64 / self.per_cell as f64
+    }
 }
 
 impl Regions {
     /// Gives cells to the narrow things in them, which the middles of most cells miss: to what has a quarter of a cell's samples, but few
     /// cells around it. So what is narrow hangs together; how wide it is, the samples say. A gap is such a thing, too.
     pub fn with_narrow_parts(&mut self) {
-        let rows = self.labels.len() / self.width.max(1);
         let mut changes = Vec::new();
-        for row in 1..rows.saturating_sub(1) {
-            for cell in row * self.width + 1..(row + 1) * self.width - 1 {
-                if let Some(label) = self.samples_of(cell).and_then(|samples| self.narrow_part(cell, samples))
-                {
-                    changes.push((cell, label));
-                }
+        for (cell, samples) in self.edge_cells.iter().zip(self.samples.chunks_exact(self.per_cell)) {
+            let cell = *cell as usize;
+            if !self.is_at_rim(cell)
+                && let Some(label) = self.narrow_part(cell, samples)
+            {
+                changes.push((cell, label));
             }
         }
         for (cell, label) in changes {
@@ -81,10 +135,19 @@ impl Regions {
         }
     }
 
+    /// Whether a cell is one of the first or last of the raster, or of its row.
+    fn is_at_rim(&self, cell: usize) -> bool {
+        let (row, column) = (cell / self.width, cell % self.width);
+        row == 0 || column == 0 || column + 1 == self.width || (row + 1) * self.width == self.labels.len()
+    }
+
     /// The region of the narrow thing in a cell, if there is one.
     fn narrow_part(&self, cell: usize, samples: &[Sample]) -> Option<u32> {
         let item = |label: u32| self.items.get(label as usize).copied().unwrap_or(label);
         let own = item(self.labels[cell]);
+        if samples.iter().all(|sample| sample.item == own) {
+            return None;
+        }
         let around = self.around(cell).into_iter().chain(self.corners(cell));
         let mut others = [0; 8];
         others.iter_mut().zip(around).for_each(|(other, cell)| *other = item(self.labels[cell]));
@@ -116,74 +179,65 @@ impl Regions {
         Some(next.saturating_sub(1).clamp(first, last) as u32)
     }
 
-    /// What is seen at the samples of a cell at an edge.
-    fn samples_of(&self, cell: usize) -> Option<&[Sample]> {
-        let first = (self.places[cell] as usize).checked_sub(1)? * self.per_cell;
-        self.samples.get(first..first + self.per_cell)
-    }
-
     /// The outlines of `count` regions, by number, in cells from the upper left corner.
-    pub fn outlines(&self, count: usize, rasters: &mut Rasters) -> Vec<Vec<Vec<Corner>>> {
+    pub fn outlines(&self, count: usize, memory: &mut MarkMemory) -> Vec<Vec<Vec<Corner>>> {
         let cells = self.labels.len();
-        let [inside, begun, seen] = rasters.marks.each_mut().map(|kept| filled(kept, cells, 0));
-        let mut marks = Marks { inside, begun, seen, holes: 0 };
-        let mut is_done = filled(&mut rasters.is_done, cells, false);
+        let mut number = memory.begin(cells);
+        memory.first.resize(cells.max(memory.first.len()), NO_SAMPLES);
+        let mut first = std::mem::take(&mut memory.first);
+        let samples = Ranks::of(self, &mut first);
+        let [inside, begun, seen] = memory.on.each_mut().map(|on| &mut on[..cells]);
+        let mut marks = Marks { inside, begun, seen, holes: number };
         let mut outlines = vec![Vec::new(); count];
-        let mut pieces = 0;
-        let (mut piece, mut rim) = (Vec::new(), Vec::new());
-        for first in 0..cells {
-            if is_done[first] || self.labels[first] >= COVERED {
-                continue;
-            }
-            pieces += 1;
-            self.gather(first, pieces, &mut is_done, &mut marks.inside, [&mut piece, &mut rim]);
-            self.spread(self.labels[first], pieces, &mut marks.inside, &mut rim);
-            outlines[self.labels[first] as usize].append(&mut self.outlines_of(
-                self.labels[first],
-                pieces,
+        let pieces = Pieces::of(&self.labels, self.width, &self.around);
+        let mut rim = Vec::new();
+        for first in pieces.firsts() {
+            number += 1;
+            let label = self.gather(pieces.cells(first), number, marks.inside, &mut rim);
+            self.spread((label, number), &samples, marks.inside, &mut rim);
+            outlines[label as usize].append(&mut self.outlines_of(
+                (label, number),
+                &samples,
                 &rim,
                 &mut marks,
             ));
         }
-        rasters.marks = [marks.inside, marks.begun, marks.seen];
-        rasters.is_done = is_done;
+        let last = number.max(marks.holes);
+        memory.end(last);
+        samples.clear(self);
+        memory.first = first;
         outlines
     }
 
-    /// The cells of a region that hang together with one of them, marked with a number; and those of them at its rim.
+    /// Marks the cells of a piece with a number, and finds those of them at its rim. Returns its region.
     fn gather(
         &self,
-        first: usize,
+        runs: impl Iterator<Item = Range<usize>>,
         number: u32,
-        is_done: &mut [bool],
         inside: &mut [u32],
-        [piece, rim]: [&mut Vec<usize>; 2],
-    ) {
-        let label = self.labels[first];
-        piece.clear();
+        rim: &mut Vec<usize>,
+    ) -> u32 {
         rim.clear();
-        piece.push(first);
-        (is_done[first], inside[first]) = (true, number);
-        let mut next = 0;
-        while let Some(&cell) = piece.get(next) {
-            next += 1;
-            let beside = self.around(cell);
-            for other in beside.into_iter().chain(self.corners(cell)) {
-                if self.labels[other] == label && !is_done[other] {
-                    (is_done[other], inside[other]) = (true, number);
-                    piece.push(other);
-                }
-            }
-            if beside.into_iter().any(|other| self.labels[other] != label) {
-                rim.push(cell);
-            }
+        let mut label = NOTHING;
+        for run in runs {
+            label = self.labels[run.start];
+            inside[run.clone()].fill(number);
+            let last = run.end - 1;
+            let is_at_rim = |cell: &usize| {
+                let beside = [cell - self.width, cell + self.width];
+                *cell == run.start
+                    || *cell == last
+                    || beside.into_iter().any(|other| self.labels[other] != label)
+            };
+            rim.extend(run.clone().filter(is_at_rim));
         }
+        label
     }
 
     /// Adds the cells near the rim of a piece that are painted later. Other pieces of the region have the same colour, so it does not matter
     /// which of the two covers a cell. Near places where what is painted later ends at something that was painted before, it adds only the
     /// cells that touch the piece: two half-transparent edges, one over the other, cover more than one.
-    fn spread(&self, label: u32, number: u32, inside: &mut [u32], rim: &mut Vec<usize>) {
+    fn spread(&self, (label, number): (u32, u32), samples: &Ranks, inside: &mut [u32], rim: &mut Vec<usize>) {
         let mut from = 0;
         for ring in 0..MARGIN {
             let end = rim.len();
@@ -194,7 +248,7 @@ impl Regions {
                 for other in others {
                     let is_free = inside[other] != number
                         && self.is_free(other, label)
-                        && (ring == 0 || self.is_amid(other, label));
+                        && (ring == 0 || self.is_amid(other, label, samples));
                     if is_free {
                         inside[other] = number;
                         rim.push(other);
@@ -212,11 +266,15 @@ impl Regions {
     }
 
     /// Whether nothing painted before a region shows in a cell, nor in those around it.
-    fn is_amid(&self, cell: usize, label: u32) -> bool {
-        let item = self.items[label as usize];
-        let is_later = |sample: &Sample| sample.item != NOTHING && sample.item >= item;
-        let is_whole = |cell: usize| self.samples_of(cell).is_none_or(|samples| samples.iter().all(is_later));
-        is_whole(cell) && self.around(cell).into_iter().all(is_whole)
+    fn is_amid(&self, cell: usize, label: u32, samples: &Ranks) -> bool {
+        samples.first[cell] > self.items[label as usize]
+    }
+
+    /// A cell and those beside, above and below it; some may be beyond the raster.
+    fn cross(&self, cell: usize) -> [usize; 5] {
+        let by = |by: usize| [cell.wrapping_sub(by), cell + by];
+        let ([left, right], [up, down]) = (by(1), by(self.width));
+        [cell, left, right, up, down]
     }
 
     /// Adds the cells of a hole, one of which is given, to a piece if all of them are painted later. False if not.
@@ -242,19 +300,21 @@ impl Regions {
     }
 
     /// The outlines of a piece, all of which begin at one of these cells.
-    fn outlines_of(&self, label: u32, number: u32, rim: &[usize], marks: &mut Marks) -> Vec<Vec<Corner>> {
+    fn outlines_of(
+        &self,
+        (label, number): (u32, u32),
+        samples: &Ranks,
+        rim: &[usize],
+        marks: &mut Marks,
+    ) -> Vec<Vec<Corner>> {
         let (item, step) = (self.items[label as usize], self.steps[label as usize]);
         let mut outlines = Vec::new();
         for &cell in rim {
             let Marks { inside, begun, .. } = marks;
             // The part of a cell that this region covers, or one that is painted later.
-            let covered = |cell: usize, part: Part| match self.samples_of(cell) {
-                Some(samples) => {
-                    let least = if part == Part::Shade { step } else { i32::MIN };
-                    let is_covered = |at: &&Sample| at.item != NOTHING && (at.item, at.step) >= (item, least);
-                    samples.iter().filter(is_covered).count() as f64 / samples.len() as f64
-                }
-                None => f64::from(u8::from(inside[cell] == number)),
+            let covered = |cell: usize, part: Part| match self.places[cell] {
+                0 => f64::from(u8::from(inside[cell] == number)),
+                place => samples.part(place, rank(item, if part == Part::Shade { step } else { i32::MIN })),
             };
             let shade = |cell: usize| {
                 let is_own = self.items.get(self.labels[cell] as usize) == Some(&item);
@@ -262,7 +322,8 @@ impl Regions {
             };
             let hidden = |cell: usize| {
                 let is_under = inside[cell] != number && self.is_free(cell, label);
-                is_under.then(|| if self.is_amid(cell, label) { Hidden::Amid } else { Hidden::NearEdge })
+                is_under
+                    .then(|| if self.is_amid(cell, label, samples) { Hidden::Amid } else { Hidden::NearEdge })
             };
             let inside = |cell| inside.get(cell) == Some(&number);
             let mask = Mask { width: self.width, inside, covered, shade, hidden };
@@ -304,10 +365,13 @@ pub(super) mod tests {
         let places = vec![0; labels.len()];
         let items = (0..10).collect();
         let (width, strengths) = (rim.len(), vec![0.0; labels.len()]);
+        let around = Spans::new(width, vec![[0, width as u32]; labels.len() / width]);
         Regions {
             width,
+            around,
             labels,
             places,
+            edge_cells: Vec::new(),
             samples: Vec::new(),
             per_cell: 1,
             items,
@@ -322,7 +386,7 @@ pub(super) mod tests {
     fn a_region_reaches_under_those_that_come_later_and_has_no_holes_for_them() {
         let of =
             regions(&["0000000000", "0111111110", "0111111110", "0111221110", "0111111110", "0000000000"]);
-        let outlines = of.outlines(3, &mut Rasters::default());
+        let outlines = of.outlines(3, &mut MarkMemory::default());
         assert_eq!(outlines.iter().map(Vec::len).collect::<Vec<_>>(), [1, 1, 1], "{outlines:?}");
         let reach = |outline: &[Corner]| outline.iter().fold(0.0_f64, |reach, p| reach.max(p[0]));
         assert!(reach(&outlines[0][0]) > 10.0 && (reach(&outlines[1][0]) - 10.0).abs() < 0.6);
@@ -336,10 +400,11 @@ pub(super) mod tests {
         for column in 1..13 {
             let cell = of.width + column;
             of.places[cell] = column as u32;
+            of.edge_cells.push(cell as u32);
             let item = of.labels[cell];
             of.samples.extend([item, item, NOTHING, NOTHING].map(|item| Sample { item, step: 0 }));
         }
-        let outlines = of.outlines(2, &mut Rasters::default());
+        let outlines = of.outlines(2, &mut MarkMemory::default());
         let reach = |upto: f64| {
             let within = outlines[0][0].iter().filter(|[_, y]| *y < upto);
             within.fold(0.0_f64, |reach, [x, _]| reach.max(*x))
@@ -352,7 +417,7 @@ pub(super) mod tests {
     #[test]
     fn what_comes_earlier_stays_open() {
         let outlines =
-            regions(&["11111", "11011", "11011", "11011", "11111"]).outlines(2, &mut Rasters::default());
+            regions(&["11111", "11011", "11011", "11011", "11111"]).outlines(2, &mut MarkMemory::default());
         assert_eq!(outlines[1].len(), 2, "an outline and its hole: {outlines:?}");
     }
 
@@ -361,7 +426,7 @@ pub(super) mod tests {
         let ring = |inner: &str| {
             let midst = format!("12222{inner}22221");
             regions(&["11111111111", "12222222221", &midst, "12222222221", "11111111111"])
-                .outlines(3, &mut Rasters::default())
+                .outlines(3, &mut MarkMemory::default())
         };
         assert_eq!((ring("2")[1].len(), ring("0")[1].len()), (1, 2));
     }
@@ -373,15 +438,16 @@ pub(super) mod tests {
         let row = 2 * of.width;
         for (place, cell) in (1..).zip(row + 3..row + 6) {
             of.places[cell] = place;
+            of.edge_cells.push(cell as u32);
             let sample = |item| Sample { item, step: 0 };
             of.samples.extend([1, 0, 0, 0].map(sample));
         }
         of.with_narrow_parts();
         assert_eq!(of.labels[row + 2..row + 7], [1; 5]);
-        assert_eq!(of.outlines(2, &mut Rasters::default())[1].len(), 1);
+        assert_eq!(of.outlines(2, &mut MarkMemory::default())[1].len(), 1);
         // What is as wide as it has cells around is none.
         let mut wide = regions(&["1111111", "0000000", "0000000"]);
-        (wide.per_cell, wide.places[row + 3]) = (4, 1);
+        (wide.per_cell, wide.places[row + 3], wide.edge_cells) = (4, 1, vec![row as u32 + 3]);
         wide.samples = [1, 1, 0, 0].map(|item| Sample { item, step: 0 }).to_vec();
         wide.with_narrow_parts();
         assert_eq!(wide.labels[row + 3], 0);

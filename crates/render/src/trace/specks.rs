@@ -1,6 +1,6 @@
 //! Pieces of regions that are too small for an outline of their own.
 
-use super::memory::{Rasters, filled};
+use super::memory::MarkMemory;
 use super::regions::{COVERED, Regions};
 
 /// Pieces of so many pixels, and of so many cells, may belong to a neighbour whose light differs by no more than this; those of a pixel to one
@@ -14,12 +14,14 @@ impl Regions {
     /// Gives small pieces of regions that stand among others of their item to the neighbour that they border on most, if its light is about theirs,
     /// so that neither noise of shading nor the many shades of what is seen through a gap makes outlines. A narrow strip that runs aslant is one
     /// piece: its cells touch in their corners. A pixel has so many cells.
-    pub fn without_specks(&mut self, per_pixel: f64, rasters: &mut Rasters) {
+    pub fn without_specks(&mut self, per_pixel: f64, marks: &mut MarkMemory) {
         let most = ((SPECK * per_pixel) as usize).clamp(1, MOST_SPECK);
         let mut piece = Vec::with_capacity(most);
         // The last piece that a cell was looked at for.
-        let (mut seen, mut number) = (filled(&mut rasters.marks[0], self.labels.len(), 0), 0);
-        for cell in self.width + 1..self.labels.len().saturating_sub(self.width + 1) {
+        let mut number = marks.begin(self.labels.len());
+        let seen = &mut marks.on[0];
+        let around = std::mem::take(&mut self.around);
+        for cell in around.cells().flatten() {
             if !self.is_first(cell) {
                 continue;
             }
@@ -32,16 +34,18 @@ impl Regions {
                 }
             }
         }
-        rasters.marks[0] = seen;
+        self.around = around;
+        marks.end(number);
     }
 
     /// Whether no cell that touches this one in the row above, or the one before, is of its region.
     fn is_first(&self, cell: usize) -> bool {
         let label = self.labels[cell];
-        let above = cell - self.width;
-        label < COVERED
-            && self.labels[cell - 1] != label
-            && [above - 1, above, above + 1].into_iter().all(|other| self.labels[other] != label)
+        // None of these is in the first row.
+        label < COVERED && self.labels[cell - 1] != label && {
+            let above = cell - self.width;
+            [above - 1, above, above + 1].into_iter().all(|other| self.labels[other] != label)
+        }
     }
 
     /// Whether the piece of a region of which this is the first cell has so many cells at most: these cells. `is_new` tells whether one is asked for
@@ -106,19 +110,19 @@ mod tests {
     fn a_narrow_strip_that_runs_aslant_is_one_region() {
         let of = || regions(&["0111", "2011", "2201", "2220"]);
         let mut cleaned = of();
-        cleaned.without_specks(1.0, &mut Rasters::default());
+        cleaned.without_specks(1.0, &mut MarkMemory::default());
         assert_eq!(cleaned.labels, of().labels);
-        assert_eq!(of().outlines(3, &mut Rasters::default())[0].len(), 1);
+        assert_eq!(of().outlines(3, &mut MarkMemory::default())[0].len(), 1);
     }
 
     #[test]
     fn a_cell_alone_goes_to_a_neighbour_of_its_item_only() {
         let mut of = regions(&["000", "010", "000"]);
         let middle = 2 * of.width + 2;
-        of.without_specks(1.0, &mut Rasters::default());
+        of.without_specks(1.0, &mut MarkMemory::default());
         assert_eq!(of.labels[middle], 1, "another item");
         of.items = vec![0; 10];
-        of.without_specks(1.0, &mut Rasters::default());
+        of.without_specks(1.0, &mut MarkMemory::default());
         assert_eq!(of.labels[middle], 0);
     }
 
@@ -131,7 +135,7 @@ mod tests {
             of.means[..3].copy_from_slice(&light);
             of.strengths =
                 of.labels.iter().map(|label| light.get(*label as usize).map_or(0.0, |x| *x as f32)).collect();
-            of.without_specks(1.0, &mut Rasters::default());
+            of.without_specks(1.0, &mut MarkMemory::default());
             of.labels[2 * of.width + 1..][..8].to_vec()
         };
         assert_eq!(cleaned("00111000"), [0; 8]);

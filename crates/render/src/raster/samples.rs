@@ -1,0 +1,192 @@
+//! Which triangle is the nearest at several samples of some pixels: those in which edges are.
+
+use super::band::left_of;
+use super::cells::{Given, Nearest};
+use super::fragments::{self, Cover, Places};
+use super::plane::Ready;
+use super::{EQUAL, Pattern, Place, STEPS, range};
+use crate::mapping::Cut;
+
+/// Eight samples, no two in a row or column.
+pub(crate) const EIGHT: Pattern<8> = [(1, -3), (-1, 3), (5, 1), (-3, -5), (-5, 5), (-7, -1), (3, 7), (7, -7)];
+/// Pixels along a side of a block.
+const BLOCK: usize = 8;
+/// The first column of a block.
+const COLUMN: u64 = 0x0101_0101_0101_0101;
+
+/// Finds the nearest triangle at each sample of these pixels; `places` has the number of each among them, from 1 on, and 0 for others. Of two at the same
+/// depth it is the later. Triangles that are known to be `seen` come first, so that most others are hidden by then.
+pub(crate) fn at_samples<'c, const N: usize>(
+    pattern: &Pattern<N>,
+    size: [usize; 2],
+    triangles: &Given<impl Fn(usize) -> [Place; 3], impl Fn(usize) -> Option<Cut<'c>>>,
+    (pixels, places): (&[u32], &[u32]),
+    seen: impl Fn(usize) -> bool,
+) -> Nearest<N> {
+    let count = pixels.len();
+    let mut nearest = Nearest { numbers: vec![[0; N]; count], depths: vec![[f32::NEG_INFINITY; N]; count] };
+    let Given { corners, cut, .. } = triangles;
+    let area = Area { samples: &fragments::places(pattern), places, size };
+    let blocks = Blocks::new(size, pixels, |_| f32::NEG_INFINITY);
+    for number in (0..triangles.count).filter(|number| seen(*number)) {
+        nearest.add(&area, &blocks, (number, corners(number), || cut(number)), |_, _| true);
+    }
+    let farthest = |depths: &[f32; N]| depths.iter().copied().fold(f32::INFINITY, f32::min);
+    let far: Vec<f32> = nearest.depths.iter().map(farthest).collect();
+    let blocks = Blocks::new(size, pixels, |place| far[place]);
+    let is_open = |place: usize, depth: f32| depth + EQUAL >= far[place];
+    for number in (0..triangles.count).filter(|number| !seen(*number)) {
+        nearest.add(&area, &blocks, (number, corners(number), || cut(number)), is_open);
+    }
+    nearest
+}
+
+/// Pixels that have samples, by blocks, so that those of them that a triangle may touch are found at once.
+struct Blocks {
+    /// Blocks in a row.
+    width: usize,
+    /// By block: the depth of what is farthest in its pixels, and these, a bit each, row by row.
+    far: Vec<f32>,
+    pixels: Vec<u64>,
+}
+
+impl Blocks {
+    /// Of these pixels. What is there is at this depth.
+    fn new([width, height]: [usize; 2], pixels: &[u32], depth: impl Fn(usize) -> f32) -> Blocks {
+        let size = [width, height].map(|side| side.div_ceil(BLOCK));
+        let count = size[0] * size[1];
+        let mut blocks = Blocks { width: size[0], far: vec![f32::INFINITY; count], pixels: vec![0; count] };
+        for (place, pixel) in pixels.iter().enumerate() {
+            let (column, row) = (*pixel as usize % width, *pixel as usize / width);
+            let block = row / BLOCK * size[0] + column / BLOCK;
+            blocks.pixels[block] |= 1 << (row % BLOCK * BLOCK + column % BLOCK);
+            blocks.far[block] = depth(place).min(blocks.far[block]);
+        }
+        blocks
+    }
+
+    /// Of each block in which something at this depth may be seen its first pixel, and its pixels within a rectangle, given by its first and last columns and
+    /// rows.
+    fn open(&self, [columns, rows]: [[usize; 2]; 2], depth: f32) -> impl Iterator<Item = ([usize; 2], u64)> {
+        // The bits from the first to the last of a range that is within a block in part.
+        let within = |block: usize, [first, last]: [usize; 2], apart: u32| {
+            let (from, to) = (first.saturating_sub(block * BLOCK), (last - block * BLOCK).min(BLOCK - 1));
+            let bits = u64::MAX >> (64 - apart * (to + 1) as u32);
+            bits & !0 << (apart * from as u32)
+        };
+        let blocks = |[first, last]: [usize; 2]| first / BLOCK..=last / BLOCK;
+        blocks(rows).flat_map(move |row| {
+            let lines = within(row, rows, BLOCK as u32);
+            blocks(columns).filter_map(move |column| {
+                let block = row * self.width + column;
+                let is_open = depth + EQUAL >= self.far[block];
+                let pixels = self.pixels[block] & lines & (within(column, columns, 1) * COLUMN);
+                (is_open && pixels != 0).then_some(([column * BLOCK, row * BLOCK], pixels))
+            })
+        })
+    }
+}
+
+/// Where there are samples.
+struct Area<'a, const N: usize> {
+    samples: &'a Places<N>,
+    /// By pixel: its place, from 1 on, or 0.
+    places: &'a [u32],
+    size: [usize; 2],
+}
+
+/// A triangle at samples.
+struct Drawn<'c, const N: usize> {
+    number: u32,
+    ready: Ready,
+    cover: Cover<N>,
+    cut: Option<Cut<'c>>,
+    /// What the samples of a pixel add to a side's function at most.
+    most: [i64; 3],
+}
+
+impl<'c, const N: usize> Drawn<'c, N> {
+    fn new(number: u32, ready: Ready, cut: Option<Cut<'c>>, samples: &Places<N>) -> Drawn<'c, N> {
+        let cover = Cover::new(&ready.sides, samples);
+        let most = ready.sides.map(|[_, a, b]| (a.max(0) + b.max(0)) * STEPS);
+        Drawn { number, ready, cover, cut, most }
+    }
+
+    /// The values of the functions of the sides at the corner of a pixel.
+    fn at(&self, [column, row]: [usize; 2]) -> [i64; 3] {
+        let Ready { columns, rows, sides, .. } = &self.ready;
+        let by = [column as i64 - columns[0] as i64, row as i64 - rows[0] as i64].map(|by| by * STEPS);
+        sides.map(|[value, a, b]| value + a * by[0] + b * by[1])
+    }
+
+    /// Whether all of so many pixels to the right and down from one are outside.
+    fn is_beside(&self, pixel: [usize; 2], count: usize) -> bool {
+        let here = self.at(pixel);
+        let most = self.most.map(|most| most * count as i64);
+        (here[0] + most[0]) | (here[1] + most[1]) | (here[2] + most[2]) < 0
+    }
+}
+
+impl<const N: usize> Nearest<N> {
+    /// Adds a triangle where it is in front. `is_open` tells whether something at this depth may be seen at a place.
+    fn add<'c>(
+        &mut self,
+        area: &Area<N>,
+        blocks: &Blocks,
+        (number, corners, cut): (usize, [Place; 3], impl FnOnce() -> Option<Cut<'c>>),
+        is_open: impl Fn(usize, f32) -> bool,
+    ) {
+        let [width, height] = area.size;
+        let columns = range(corners.map(|corner| i64::from(corner.x)), width);
+        let rows = range(corners.map(|corner| i64::from(corner.y)), height);
+        let Some((columns, rows)) = columns.zip(rows) else { return };
+        let front = corners[0].depth.max(corners[1].depth).max(corners[2].depth);
+        // Most triangles touch no pixel that has samples.
+        let (mut drawn, mut cut): (Option<Drawn<N>>, _) = (None, Some(cut));
+        for (first, mut pixels) in blocks.open([columns, rows], front) {
+            if drawn.as_ref().is_some_and(|drawn| drawn.is_beside(first, BLOCK)) {
+                continue;
+            }
+            while pixels != 0 {
+                let bit = pixels.trailing_zeros() as usize;
+                pixels &= pixels - 1;
+                let pixel = [first[0] + bit % BLOCK, first[1] + bit / BLOCK];
+                let place = area.places[pixel[1] * width + pixel[0]] as usize - 1;
+                if !is_open(place, front) {
+                    continue;
+                }
+                if drawn.is_none() {
+                    let ready = Ready::new(corners, width, &(0..height));
+                    let cut = cut.take().and_then(|cut| cut());
+                    drawn = ready.map(|ready| Drawn::new(number as u32 + 1, ready, cut, area.samples));
+                }
+                let Some(drawn) = &drawn else { return };
+                if !drawn.is_beside(pixel, 1) {
+                    self.add_at(place, area, drawn, pixel);
+                }
+            }
+        }
+    }
+
+    /// Adds a triangle in a pixel.
+    fn add_at(&mut self, place: usize, area: &Area<N>, drawn: &Drawn<N>, pixel: [usize; 2]) {
+        let [xs, ys] = area.samples;
+        let covered = drawn.cover.mask(drawn.at(pixel));
+        let mask = drawn.cut.as_ref().map_or(covered, |cut| left_of(cut, covered, pixel, area.samples));
+        if mask == 0 {
+            return;
+        }
+        let plane = &drawn.ready.plane;
+        let base = plane.at(pixel);
+        let (numbers, depths) = (&mut self.numbers[place], &mut self.depths[place]);
+        // Without branches, so that the compiler works on several samples at a time.
+        for s in 0..N {
+            let depth = plane.sample(base, [xs[s], ys[s]]);
+            let least = if drawn.number > numbers[s] { depth + EQUAL } else { depth - EQUAL };
+            let is_nearer = mask >> s & 1 == 1 && least >= depths[s];
+            let nearest = if depth > depths[s] { depth } else { depths[s] };
+            depths[s] = if is_nearer { nearest } else { depths[s] };
+            numbers[s] = if is_nearer { drawn.number } else { numbers[s] };
+        }
+    }
+}
