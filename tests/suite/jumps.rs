@@ -212,6 +212,16 @@ fn a_production_that_holds_just_after_a_jump_finds_what_jumps_as_it_is_there() {
             }
         }
     }
+    // A sign has a value of its own at zero.
+    for start in [-0.53, -0.5] {
+        let text = format!(
+            "initial string: A({start}, -1, 0)\nA(x, n, k):\n  solve dx/dt = 1.3\n  if sign(x - 1) != n produce A(x, sign(x - 1), k + 1)"
+        );
+        assert_eq!(at(&text, 3.0)[0].1[1..], [1.0, 2.0], "{text}");
+    }
+    // However slow it is, and beside something larger.
+    let text = "initial string: A(0.001, 0)\nA(x, n):\n  solve dx/dt = -0.001\n  if floor(x) != n produce A(x, floor(x)) L(floor(x + 8), floor(x + 100))";
+    assert_eq!(at(text, 2.0)[1].1, [7.0, 99.0]);
     // Also with what is made once for each whole number, and from a condition that says the same in other words.
     let text = "initial string: A(2.5)\nA(x):\n  solve dx/dt = -1\n  if x < 2 produce B(floor(x), x) for i in 1 .. floor(x): ( C(i) )";
     let string = at(text, 1.0);

@@ -259,6 +259,19 @@ fn a_rate_that_is_zero_on_the_boundary_keeps_a_module_there() {
 }
 
 #[test]
+fn a_value_that_jumps_at_an_instant_is_read_as_it_is_after_the_jump() {
+    // V is 0.25 when B goes, and 0.5 from then on.
+    let tissue = "initial string: B(0) V(0) W(0)\nB(x) > V(q):\n  solve dx/dt = 1\n  if q >= 0.25 produce ε\nB(p) < V(v): solve v = p\nV(v): solve v = 0.5\n";
+    for (law, seen) in [
+        ("V(p) < W(w): solve w = if p < 0.5 then 7 else 2*p", "V(0.5) W(1)"),
+        ("V(p) < W(w): solve dw/dt = if p < 0.5 then 1 else 0", "V(0.5) W(0.25)"),
+        ("V(p) < W(w): solve w = if p > 0.3 then 2*p else 7", "V(0.5) W(1)"),
+    ] {
+        expect(&format!("{tissue}{law}"), &[(2.0, seen)]);
+    }
+}
+
+#[test]
 fn a_signal_passes_along_many_modules_at_once() {
     let string = "initial string: X(0) for i in 1 .. 300: ( V(0) ) L(0)\nX(x): solve dx/dt = 1\n";
     let row = "X(x) < V(v): solve v = if x > 0.5 then 1 else 0\nV(p) < V(v): solve v = if p > 0.5 then 1 else 0\nV(p) < L(y): solve dy/dt = p";

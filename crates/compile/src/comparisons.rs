@@ -121,12 +121,24 @@ fn equal(graph: &mut Graph, step: NodeId, level: NodeId, is_steady: &dyn Fn(u32)
                 None => Some(graph.binary(Binary::And, is_whole, both)),
             }
         }
-        Node::Unary(Unary::Sign, x) => match graph.as_constant(level)? {
-            1.0 => Some(ordered(graph, true, zero, x)),
-            -1.0 => Some(ordered(graph, true, x, zero)),
-            0.0 => Some(graph.binary(Binary::Eq, x, zero)),
-            _ => Some(zero),
-        },
+        Node::Unary(Unary::Sign, x) => {
+            let signs = [(-1.0, Binary::Lt, x, zero), (0.0, Binary::Eq, x, zero), (1.0, Binary::Lt, zero, x)];
+            if let Some(level) = graph.as_constant(level) {
+                let found = signs.into_iter().find(|(sign, ..)| *sign == level);
+                return Some(found.map_or(zero, |(_, op, a, b)| graph.binary(op, a, b)));
+            }
+            if !jumps(graph, x, level, is_steady) {
+                return None;
+            }
+            let one = |graph: &mut Graph, (sign, op, a, b): (f64, Binary, NodeId, NodeId)| {
+                let sign = graph.constant(sign);
+                let (is_so, holds) = (graph.binary(Binary::Eq, level, sign), graph.binary(op, a, b));
+                graph.binary(Binary::And, is_so, holds)
+            };
+            let [minus, rest, plus] = signs.map(|sign| one(graph, sign));
+            let one_of = graph.binary(Binary::Or, minus, rest);
+            Some(graph.binary(Binary::Or, one_of, plus))
+        }
         Node::Unary(Unary::Abs, x) if x == level => Some(ordered(graph, false, zero, x)),
         Node::Binary(op @ (Binary::Min | Binary::Max), x, y) if x == level || y == level => {
             let (same, other) = if x == level { (x, y) } else { (y, x) };

@@ -353,6 +353,19 @@ impl Program {
         all.into_iter().map(|register| register as usize).filter(|r| *r < self.variables).collect()
     }
 
+    /// True if one output is made of something that jumps.
+    pub fn output_jumps(&self, output: usize) -> bool {
+        let Some(&register) = self.outputs.get(output) else { return false };
+        let mut wanted: BTreeSet<Register> = BTreeSet::from([register]);
+        self.code.iter().rev().any(|instruction| {
+            let is_part = wanted.remove(&instruction.destination());
+            if is_part {
+                wanted.extend(instruction.operands().into_iter().flatten());
+            }
+            is_part && self.jumps_over(instruction).iter().any(Option::is_some)
+        })
+    }
+
     /// The operands over which an instruction jumps.
     fn jumps_over(&self, instruction: &Instruction) -> [Option<Register>; 2] {
         let compares = |op| matches!(op, Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne);

@@ -113,7 +113,16 @@ fn asks_for_jumps(rule: &Rule, produce: &Produce) -> bool {
 
 /// By production: something jumps in its condition or its successors.
 fn jumps(rule: &Rule) -> Vec<bool> {
-    let jumps =
-        |produce: &Produce| asks_for_jumps(rule, produce) || produce.outcome.jump_reads().next().is_some();
+    // What jumps in a condition that was not taken apart has no side on which it could be looked at: its instant is known to rounding only.
+    let is_whole = |produce: &Produce| {
+        let mut atoms = produce.guard.atoms();
+        atoms.any(|(atom, _)| {
+            let [a, b] = [2 * atom, 2 * atom + 1].map(|side| rule.sides.output_jumps(side));
+            !rule.jumping[atom] && (a || b)
+        })
+    };
+    let jumps = |produce: &Produce| {
+        !is_whole(produce) && (asks_for_jumps(rule, produce) || produce.outcome.jump_reads().next().is_some())
+    };
     rule.produces.iter().map(jumps).collect()
 }

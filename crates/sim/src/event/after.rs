@@ -17,6 +17,12 @@ const FIRST_DELAY: f64 = 64.0;
 /// No delay is longer than this part of the present time, or of 1.
 const LONGEST_DELAY: f64 = 1e-6;
 
+/// Every variable over which something jumps moves at least by this part of its size, or of 1, so that also its sum with something larger does,
+const LEAST_MOVE: f64 = 1e-12;
+
+/// and none by more than this part, if that is possible.
+const MOST_MOVE: f64 = 1e-9;
+
 /// Sides that differ by so much of their size differ by more than rounding, in whatever way the successor is written.
 const CLEAR: f64 = 1024.0 * f64::EPSILON;
 
@@ -91,8 +97,17 @@ impl EventStage<'_, '_> {
         };
         self.flows.known_rates.clear();
         let longest = LONGEST_DELAY * self.instant.at.to_f64().abs().max(1.0);
-        let mut delay = (FIRST_DELAY * self.instant.at.resolution()).min(longest);
         let (mut moving, mut registers) = (Vec::new(), Vec::new());
+        self.flow().moving_variables(fire.id, 0.0, &mut moving);
+        let [mut least, mut most] = [FIRST_DELAY * self.instant.at.resolution(), longest];
+        for variable in rule.produces[fire.produce].outcome.jump_reads() {
+            let Some(Dual { value, rate }) = moving.get(variable).filter(|moving| moving.rate != 0.0) else {
+                continue;
+            };
+            let time = value.abs().max(1.0) / rate.abs();
+            (least, most) = (least.max(LEAST_MOVE * time), most.min(MOST_MOVE * time));
+        }
+        let mut delay = least.min(most);
         let mut sides = vec![Dual { value: 0.0, rate: 0.0 }; rule.sides.outputs()];
         loop {
             self.flow().moving_variables(fire.id, delay, &mut moving);

@@ -24,7 +24,11 @@ fn closing(shape: &[ContextPart]) -> usize {
     shape.len()
 }
 
-/// Puts the levels that parameters of a module's context meet at this instant among the variables of its rule.
+/// A value that is further from a level than this part of it, or of 1, has left it since.
+const LEFT: f64 = 1e-12;
+
+/// Puts the levels that parameters of a module's context meet at this instant among the variables of its rule; a value that has jumped at the
+/// instant meets none any more.
 pub fn put_levels(
     met: &[(ModuleId, usize, f64)],
     (tree, id): (&Tree, ModuleId),
@@ -37,7 +41,10 @@ pub fn put_levels(
     let mut first = tree.parameters(id).len();
     for &module in around.context() {
         for &(_, parameter, level) in met.iter().filter(|met| met.0 == module) {
-            variables[first + parameter] = level;
+            let value: &mut f64 = &mut variables[first + parameter];
+            if (*value - level).abs() <= LEFT * level.abs().max(1.0) {
+                *value = level;
+            }
         }
         first += tree.parameters(module).len();
     }
