@@ -219,6 +219,15 @@ fn a_production_that_holds_just_after_a_jump_finds_what_jumps_as_it_is_there() {
         );
         assert_eq!(at(&text, 3.0)[0].1[1..], [1.0, 2.0], "{text}");
     }
+    // Whole parts of functions of time.
+    for (law, first, last) in [
+        ("floor(0.32 + 2.236*t)", 0.0, 4.0),
+        ("ceil(0.32 - 2.236*t)", 1.0, -4.0),
+        ("floor(0.32 - 2.236*t)", 0.0, -5.0),
+    ] {
+        let text = format!("initial string: A({first}, 0)\nA(n, k): if {law} != n produce A({law}, k + 1)");
+        assert_eq!(at(&text, 2.0)[0].1, [last, f64::abs(last - first)], "{text}");
+    }
     // However slow it is, and beside something larger.
     let text = "initial string: A(0.001, 0)\nA(x, n):\n  solve dx/dt = -0.001\n  if floor(x) != n produce A(x, floor(x)) L(floor(x + 8), floor(x + 100))";
     assert_eq!(at(text, 2.0)[1].1, [7.0, 99.0]);

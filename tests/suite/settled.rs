@@ -269,6 +269,14 @@ fn a_value_that_jumps_at_an_instant_is_read_as_it_is_after_the_jump() {
     ] {
         expect(&format!("{tissue}{law}"), &[(2.0, seen)]);
     }
+    // It rests where it is, at the threshold.
+    let rests = tissue.replace("solve v = 0.5", "solve v = 0.25");
+    for (law, seen) in [
+        ("if p > 0.25 produce Z(p)", "V(0.25) W(0)"),
+        ("solve dw/dt = if p <= 0.25 then 1 else 5", "V(0.25) W(2)"),
+    ] {
+        expect(&format!("{rests}V(p) < W(w): {law}"), &[(2.0, seen)]);
+    }
 }
 
 #[test]

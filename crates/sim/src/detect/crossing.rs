@@ -56,7 +56,7 @@ pub struct Crossing {
     pub at: Sign,
     /// The sign just after it.
     pub after: Sign,
-    /// The parameter that reaches a level there, and the level, if both are known.
+    /// The parameter that reaches a level there, or the time, and the level, if both are known.
     pub level: Option<(usize, f64)>,
 }
 
@@ -275,7 +275,7 @@ impl CrossingDetector {
         Some(Crossing { position, time, at, after, level })
     }
 
-    /// The parameter of the module, or of a neighbour, whose value the condition of a production compares with a level that rests, and the level.
+    /// The parameter of the module, or of a neighbour, or the time, whose value the condition of a production compares with a level that rests, and the level.
     /// Without it a successor that gets a value at its limit would get a rounding of the limit, perhaps on its other side.
     fn level_of(&mut self, path: &Path, atom: usize) -> Option<(usize, f64)> {
         let decides = |condition: &Condition| condition.atoms().any(|(other, _)| other == atom);
@@ -289,7 +289,7 @@ impl CrossingDetector {
             }
             _ => return None,
         };
-        (variable < path.rule.time_variable()).then_some((variable, level))
+        (variable <= path.rule.time_variable()).then_some((variable, level))
     }
 
     /// The effect of the rounding of the variables on the difference of two sides; 0 where the difference jumps.
@@ -340,7 +340,7 @@ impl CrossingDetector {
             Reach::After(tau) => path.state.since.after(tau),
         };
         let position = time.since(path.start) / path.h;
-        let level = (variable < t).then_some((variable, level));
+        let level = (variable <= t).then_some((variable, level));
         let after = opposite(sign);
         let crossing = Crossing { position, time, at: Sign::Zero, after, level };
         if position > path.start.resolution() / path.h {

@@ -74,8 +74,11 @@ fn set_levels(world: &World, fire: &Firing, (rule, decide): (&Rule, bool), scrat
     let Some(state) = world.state(fire.id).filter(|state| state.rule == Some(fire.rule)) else { return };
     let Scratch { variables, registers, .. } = scratch;
     for &Level { atom, variable, value, after } in state.open.iter().flat_map(|open| &open.levels) {
-        variables[variable] = value;
         if !decide {
+            // The time is known to the last digit as it is.
+            if variable != rule.time_variable() {
+                variables[variable] = value;
+            }
             continue;
         }
         let mut sides = vec![0.0; rule.sides.outputs()];

@@ -292,8 +292,8 @@ impl EventStage<'_, '_> {
         };
         let begins_anew = match &state.open {
             Some(open) => is_other(open),
-            // It has lost its equations at this instant.
-            None => state.restarted == self.instant.number,
+            // It has got others that need no choice, or none, at this instant.
+            None => state.restarted == self.instant.number || self.instant.at.since(state.since) <= 0.0,
         };
         if begins_anew {
             return false;
