@@ -3,7 +3,7 @@
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed. 1993, sections II.5 and II.6,
 //! and their code DOP853.
 
-use super::explicit::{Pair, Tableau};
+use super::explicit::{Pair, Tableau, changes};
 use crate::Rates;
 use crate::column::Column;
 use crate::dense::{Dense, PLACE};
@@ -31,16 +31,7 @@ impl Pair for Dop853 {
         count: usize,
         out: &mut Vec<f64>,
     ) {
-        let mut hk = [[0.0; N]; 16];
-        for (hk, k) in hk.iter_mut().zip(k) {
-            if N == 1 {
-                hk[0] = h * k.at(first);
-                continue;
-            }
-            for (hk, k) in hk.iter_mut().zip(&k[first..first + N]) {
-                *hk = h * k;
-            }
-        }
+        let hk = changes::<N, 16>(k, first, h);
         out.extend_from_slice(dop853_dense(y, end, &hk)[..count].as_flattened());
     }
 

@@ -3,7 +3,7 @@
 //! Sources: J. R. Dormand, P. J. Prince, "A family of embedded Runge-Kutta formulae", J. Comput. Appl. Math. 6 (1980) 19-26;
 //! E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed. 1993, sections II.5 and II.6.
 
-use super::explicit::{Pair, Tableau};
+use super::explicit::{Pair, Tableau, changes};
 use crate::column::Column;
 use crate::workspace::MAX_STAGES;
 
@@ -26,16 +26,7 @@ impl Pair for Dopri5 {
         count: usize,
         out: &mut Vec<f64>,
     ) {
-        let mut hk = [[0.0; N]; 7];
-        for (hk, k) in hk.iter_mut().zip(k) {
-            if N == 1 {
-                hk[0] = h * k.at(first);
-                continue;
-            }
-            for (hk, k) in hk.iter_mut().zip(&k[first..first + N]) {
-                *hk = h * k;
-            }
-        }
+        let hk = changes::<N, 7>(k, first, h);
         out.extend_from_slice(dopri5_dense(y, end, &hk)[..count].as_flattened());
     }
 }

@@ -84,6 +84,26 @@ pub trait Pair: Clone {
     }
 }
 
+/// The rates of `N` components, from `first` on, at the first `S` stages, times the length of the step.
+#[inline(always)]
+pub(super) fn changes<const N: usize, const S: usize>(
+    k: &[Column; MAX_STAGES],
+    first: usize,
+    h: f64,
+) -> [[f64; N]; S] {
+    let mut hk = [[0.0; N]; S];
+    for (hk, k) in hk.iter_mut().zip(k) {
+        if N == 1 {
+            hk[0] = h * k.at(first);
+            continue;
+        }
+        for (hk, k) in hk.iter_mut().zip(&k[first..first + N]) {
+            *hk = h * k;
+        }
+    }
+    hk
+}
+
 /// The one-step method of a pair.
 #[derive(Clone, Debug)]
 pub struct Explicit<P> {
