@@ -118,10 +118,8 @@ impl CrossingDetector {
         let noise = if around { noise.max(BLUR * tolerance) } else { noise };
         // Equations change where their conditions do, however near that is: only a wrong sign waits.
         let in_band = start.abs() <= noise && (query.decides || start <= 0.0);
-        if noise > tolerance
-            && in_band
-            && let Some(ahead) = self.leave_band(path, &mut query, start, noise)
-        {
+        let begins_inside = noise > tolerance && in_band;
+        if begins_inside && let Some(ahead) = self.leave_band(path, &mut query, start, noise) {
             return ahead;
         }
         let next = self.root(path, atom, query.from, limit, sign, tolerance);
@@ -147,8 +145,9 @@ impl CrossingDetector {
         if noise <= tolerance {
             return Lookahead::crossing(next);
         }
-        // What begins on the boundary has no error there, and soon more than its distance: it does not come near, it comes from there.
-        if start.abs() <= tolerance
+        // What begins on the boundary, or near it, has no or less error there, and soon more than its distance: it does not come near,
+        // it comes from there.
+        if (begins_inside || start.abs() <= tolerance)
             && let Some(ahead) = self.leave_band(path, &mut query, start, noise)
         {
             return ahead;

@@ -16,6 +16,7 @@
 
 mod after;
 mod apply;
+mod behind;
 pub mod chance;
 mod consistency;
 mod cut;
@@ -23,6 +24,7 @@ pub mod derivation;
 mod exact;
 mod iterate;
 mod lazy;
+mod levels;
 mod lookup;
 mod matching;
 mod modes;

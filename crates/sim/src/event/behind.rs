@@ -1,0 +1,140 @@
+//! The instant behind a jump.
+//!
+//! `if floor(x)*2 + 1 != n produce A(floor(x)*2 + 1)`: the difference of the sides is not zero where x reaches a whole number, it
+//! jumps there. The instant of a jump is known to rounding only, and at a time a rounding too early the condition does not hold, and a
+//! successor gets the value from before. So the event takes place at the first time at which the condition holds by the numbers that
+//! the successor is computed from. The same goes for `floor(p + z) != n`, where the sides that meet, `p + z` and `n + 1`, meet in no
+//! variable that could be given the value at the level.
+
+use super::EventStage;
+use super::levels::put_levels;
+use crate::world::state::{Change, Signs};
+use dlsys_expr::Dual;
+use dlsys_model::{Comparison, Rule, Sign, Truth};
+use dlsys_tree::{ModuleId, SimTime};
+
+/// No event is put off by more than this part of the present time, or of 1: then what jumps moves less than its rounding.
+const LONGEST_DELAY: f64 = 1e-6;
+
+/// And none by less: near t = 0 the resolution of time is so fine that what moves is less than the smallest normal number.
+const SHORTEST_DELAY: f64 = 1e-18;
+
+/// When the event of a module takes place.
+pub(super) enum When {
+    /// Now; the signs are those by the numbers of now.
+    Now,
+    /// Not before then.
+    Later(SimTime),
+}
+
+/// The first production that holds with such signs.
+fn production(rule: &Rule, sign: impl Fn(usize) -> Sign) -> Option<usize> {
+    rule.produces.iter().position(|produce| produce.guard.judge(&sign) == Truth::Yes)
+}
+
+impl EventStage<'_, '_> {
+    /// True if the instant of a change of sign has to be put behind a jump.
+    fn is_jump(&self, rule: usize, change: &Change) -> bool {
+        let (of_rule, atom) = (&self.setup.model.rules[rule], change.atom);
+        if of_rule.jumping_whole[atom] {
+            return true;
+        }
+        // The sign of zero is zero at an instant only.
+        let mut compared = of_rule.produces.iter().flat_map(|produce| produce.guard.atoms());
+        of_rule.jumping[atom]
+            && change.level.is_none_or(|(variable, _)| variable >= of_rule.first_aggregate)
+            && !compared.any(|compared| compared == (atom, Comparison::Equal))
+    }
+
+    /// When the event of a module takes place whose signs change so, by the numbers of now and of a little later. The signs at the
+    /// instant become those by the numbers, where that is now.
+    pub(super) fn behind_jumps(&mut self, id: ModuleId, touched: &mut [Change]) -> When {
+        let Some(state) = self.world.state(id) else { return When::Now };
+        let Some(index) = state.rule.filter(|rule| self.setup.has_jumps[*rule]) else {
+            return When::Now;
+        };
+        let jumps: Vec<bool> = touched.iter().map(|change| self.is_jump(index, change)).collect();
+        let rule = &self.setup.model.rules[index];
+        for (change, _) in touched.iter_mut().zip(&jumps).filter(|(_, jumps)| !**jumps) {
+            if rule.jumping[change.atom] && change.level.is_none() && change.at == Sign::Zero {
+                change.level = self.meeting(id, rule, change.atom);
+            }
+        }
+        if !jumps.contains(&true) {
+            return When::Now;
+        }
+        let state = self.world.state(id).expect("seen above");
+        let mut before = Signs::from_slice(&state.signs);
+        let passed = |change: &&Change| change.time.since(self.instant.at) <= 0.0;
+        for change in state.next.changes().iter().filter(passed) {
+            before[change.atom] = change.after;
+        }
+        let with = |sign: &dyn Fn(usize) -> Sign| {
+            production(rule, |atom| match touched.iter().position(|change| change.atom == atom) {
+                Some(place) => sign(place),
+                None => before[atom],
+            })
+        };
+        if with(&|place| touched[place].after).is_none() {
+            return When::Now;
+        }
+        let holds = |signs: &[Sign]| {
+            let of = |place: usize, other: Sign| if jumps[place] { signs[place] } else { other };
+            with(&|place| of(place, touched[place].at)).is_some()
+                || with(&|place| of(place, touched[place].after)).is_some()
+        };
+        let now = self.signs_by_numbers(id, index, touched);
+        if holds(&now) {
+            self.events.is_after |=
+                (jumps.iter().zip(&now)).any(|(jumps, sign)| *jumps && *sign != Sign::Zero);
+            for (place, change) in touched.iter_mut().enumerate().filter(|(place, _)| jumps[*place]) {
+                (change.at, change.level) = (now[place], None);
+                if now[place] != Sign::Zero {
+                    change.after = now[place];
+                }
+            }
+            return When::Now;
+        }
+        let at = self.instant.at;
+        let longest = LONGEST_DELAY * at.to_f64().abs().max(1.0);
+        let waited = touched.iter().map(|change| at.since(change.time)).fold(0.0, f64::max);
+        let mut delay = at.resolution().max(SHORTEST_DELAY).max(waited);
+        self.flows.known_rates.clear();
+        while delay <= longest {
+            let later = self.signs_later(id, index, touched, delay);
+            if holds(&later) {
+                return When::Later(at.after(delay));
+            }
+            delay *= 2.0;
+        }
+        When::Now
+    }
+
+    /// The signs of differences by the numbers of now.
+    fn signs_by_numbers(&mut self, id: ModuleId, index: usize, touched: &[Change]) -> Vec<Sign> {
+        let rule = &self.setup.model.rules[index];
+        let state = self.world.state(id).expect("scheduled");
+        let variables = &mut self.scratch.variables;
+        self.world.variables(rule, id, &state.context, self.instant.at, variables);
+        put_levels(&self.events.met, (&self.world.tree, id), &state.context, variables);
+        for (variable, level) in touched.iter().filter_map(|change| change.level) {
+            if variable < rule.first_aggregate {
+                variables[variable] = level;
+            }
+        }
+        let mut sides = vec![0.0; rule.sides.outputs()];
+        rule.sides.eval(&self.scratch.variables, &mut self.scratch.registers, &mut sides);
+        touched.iter().map(|change| Sign::of(sides[2 * change.atom] - sides[2 * change.atom + 1])).collect()
+    }
+
+    /// The signs of differences a little later.
+    fn signs_later(&mut self, id: ModuleId, index: usize, touched: &[Change], delay: f64) -> Vec<Sign> {
+        let mut moving: Vec<Dual<f64>> = Vec::new();
+        self.flow().moving_variables(id, delay, &mut moving);
+        let values: Vec<f64> = moving.iter().map(|variable| variable.value).collect();
+        let rule = &self.setup.model.rules[index];
+        let mut sides = vec![0.0; rule.sides.outputs()];
+        rule.sides.eval(&values, &mut self.scratch.registers, &mut sides);
+        touched.iter().map(|change| Sign::of(sides[2 * change.atom] - sides[2 * change.atom + 1])).collect()
+    }
+}
