@@ -117,10 +117,8 @@ fn asks_for_jumps(rule: &Rule, produce: &Produce) -> bool {
 
 /// By production: something jumps in its condition or its successors.
 fn jumps(rule: &Rule) -> Vec<bool> {
-    // What jumps in a condition that was not taken apart has no side on which it could be looked at: its instant is put behind the jump.
-    let is_whole = |produce: &Produce| produce.guard.atoms().any(|(atom, _)| rule.jumping_whole[atom]);
-    let jumps = |produce: &Produce| {
-        !is_whole(produce) && (asks_for_jumps(rule, produce) || produce.outcome.jump_reads().next().is_some())
-    };
+    let asks = |produce: &Produce| produce.guard.atoms().any(|(atom, _)| rule.jumping_whole[atom]);
+    let makes = |produce: &Produce| produce.outcome.jump_reads().next().is_some();
+    let jumps = |produce: &Produce| asks_for_jumps(rule, produce) || asks(produce) || makes(produce);
     rule.produces.iter().map(jumps).collect()
 }

@@ -114,7 +114,10 @@ impl CrossingDetector {
         let is_far = start.abs() > FAR * query.error * size;
         let noise = if is_far { 0.0 } else { self.noise(path, atom, query.from) };
         // The value of a neighbour is approached only numerically, and rounding may make the sides equal at last.
-        let around = path.rule.reads_context && !path.state.context.is_empty() && query.decides;
+        let around = path.rule.reads_context
+            && !path.state.context.is_empty()
+            && query.decides
+            && !path.rule.jumping_whole[atom];
         let noise = if around { noise.max(BLUR * tolerance) } else { noise };
         // Equations change where their conditions do, however near that is: only a wrong sign waits.
         let in_band = start.abs() <= noise && (query.decides || start <= 0.0);
@@ -307,7 +310,11 @@ impl CrossingDetector {
         let sides = &path.rule.sides;
         self.around_out.resize(sides.outputs(), Interval::EMPTY);
         sides.eval(&self.around, &mut self.whole_scratch, &mut self.around_out);
-        half_width(self.around_out[2 * atom], self.around_out[2 * atom + 1])
+        let (a, b) = (self.around_out[2 * atom], self.around_out[2 * atom + 1]);
+        let width = half_width(a, b);
+        // A wider one is that of a jump.
+        let is_jump = || width > FAR * path.error() * a.magnitude().max(b.magnitude()).max(1.0);
+        if path.rule.jumping_whole[atom] && is_jump() { 0.0 } else { width }
     }
 
     /// True if the sides of an atom approach each other over the path, and are at its start no further apart than

@@ -16,13 +16,15 @@ use dlsys_tree::{ModuleId, SimTime};
 /// No event is put off by more than this part of the present time, or of 1: then what jumps moves less than its rounding.
 const LONGEST_DELAY: f64 = 1e-6;
 
-/// And none by less: near t = 0 the resolution of time is so fine that what moves is less than the smallest normal number.
+/// And none by less: near t = 0 the resolution of time is so fine that what has moved is less than the smallest normal number.
 const SHORTEST_DELAY: f64 = 1e-18;
 
 /// When the event of a module takes place.
 pub(super) enum When {
-    /// Now; the signs are those by the numbers of now.
+    /// Now.
     Now,
+    /// Now, behind a jump: the signs at the instant are those by the numbers of now.
+    Behind,
     /// Not before then.
     Later(SimTime),
 }
@@ -84,18 +86,21 @@ impl EventStage<'_, '_> {
                 || with(&|place| of(place, touched[place].after)).is_some()
         };
         let now = self.signs_by_numbers(id, index, touched);
-        if holds(&now) {
-            self.events.is_after |=
-                (jumps.iter().zip(&now)).any(|(jumps, sign)| *jumps && *sign != Sign::Zero);
+        let at = self.instant.at;
+        // Of numbers below the normal ones parts are lost.
+        let is_normal = at.to_f64() == 0.0 || at.to_f64().abs() >= SHORTEST_DELAY;
+        if is_normal && holds(&now) {
+            let mut is_behind = false;
             for (place, change) in touched.iter_mut().enumerate().filter(|(place, _)| jumps[*place]) {
                 (change.at, change.level) = (now[place], None);
                 if now[place] != Sign::Zero {
                     change.after = now[place];
+                    is_behind = true;
                 }
             }
-            return When::Now;
+            self.events.is_after |= is_behind;
+            return if is_behind { When::Behind } else { When::Now };
         }
-        let at = self.instant.at;
         let longest = LONGEST_DELAY * at.to_f64().abs().max(1.0);
         let waited = touched.iter().map(|change| at.since(change.time)).fold(0.0, f64::max);
         let mut delay = at.resolution().max(SHORTEST_DELAY).max(waited);

@@ -122,6 +122,11 @@ impl Events {
             ..Events::default()
         }
     }
+
+    /// True if the instant concerns no module.
+    pub fn is_idle(&self) -> bool {
+        self.opened.is_empty() && self.firing.is_empty() && self.firing_lazy.is_empty() && !self.steps.due
+    }
 }
 
 /// The parts that event iteration works on.

@@ -153,13 +153,17 @@ impl EventStage<'_, '_> {
         }
         let kind = state.next.kind;
         let mut touched = state.next.take_touched();
-        if let When::Later(time) = self.behind_jumps(id, &mut touched) {
+        let when = self.behind_jumps(id, &mut touched);
+        if let When::Later(time) = when {
             self.world.states[slot].as_mut().expect("scheduled").next.touch(kind, touched);
             self.schedule.schedule(Owner::Module(slot as u32), time);
             return Ok(None);
         }
         self.flow().learn(id);
         self.touch(id, &touched);
+        if let (When::Behind, Some(state)) = (when, self.world.state_mut(id)) {
+            open(state).behind = true;
+        }
         Ok(Some(id))
     }
 
