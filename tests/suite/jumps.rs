@@ -242,3 +242,108 @@ fn a_production_that_holds_just_after_a_jump_finds_what_jumps_as_it_is_there() {
     let text = "initial string: A(2.5, 2) L(0)\nA(x, n):\n  solve dx/dt = -1 + 0*sin(x)\n  if floor(x) != n produce A(x, floor(x))\nA(x, n) < L(c): if floor(x) > n produce L(c + 1)";
     assert_eq!(at(text, 2.0)[1].1, [0.0]);
 }
+
+/// The last value of a function of a whole part, and the number of its changes, of an x that moves from `start` at a rate until t = 3, with
+/// jumps at quarters only.
+fn counted_through(start: f64, rate: f64, f: &dyn Fn(f64) -> f64) -> [f64; 3] {
+    let mut times: Vec<f64> = (-60..=60).map(|quarter| (f64::from(quarter) / 4.0 - start) / rate).collect();
+    times.retain(|time| (0.0..3.0).contains(time));
+    times.extend([0.0, 3.0]);
+    times.sort_by(f64::total_cmp);
+    let values: Vec<f64> = times.windows(2).map(|ends| f(start + rate * (ends[0] + ends[1]) / 2.0)).collect();
+    let changes = values.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    [values[0], values[values.len() - 1], changes as f64]
+}
+
+#[test]
+fn conditions_that_jump_as_a_whole_hold_behind_the_jump() {
+    type Law = (&'static str, fn(f64) -> f64);
+    let laws: [Law; 11] = [
+        ("max(floor(x), -1)", |x| x.floor().max(-1.0)),
+        ("floor(x)*2 + 1", |x| x.floor() * 2.0 + 1.0),
+        ("-floor(x)", |x| -x.floor()),
+        ("abs(floor(x))", |x| x.floor().abs()),
+        ("floor(x) - 2*floor(x/2)", |x| x.floor() - 2.0 * (x / 2.0).floor()),
+        ("q[x + 9]", |x| [3.0, 1.0, 4.0, 1.0, 5.0, 9.0, 2.0, 6.0, 5.0, 3.0][((x + 9.0) as usize) % 10]),
+        ("if x > 1 then 2 else if x >= 0 then 1 else 0", |x| {
+            f64::from(u8::from(x > 1.0) + u8::from(x >= 0.0))
+        }),
+        ("if x - floor(x) < 0.75 then 1 else 0", |x| f64::from(u8::from(x - x.floor() < 0.75))),
+        ("match floor(x) case 0: 5 case 1: 7 else 2", |x| match x.floor() {
+            0.0 => 5.0,
+            1.0 => 7.0,
+            _ => 2.0,
+        }),
+        ("floor(x + 0.5*y)", |x| x.floor()),
+        ("min(2, max(floor(x), 0))", |x| x.floor().clamp(0.0, 2.0)),
+    ];
+    let q = "const q = [3, 1, 4, 1, 5, 9, 2, 6, 5, 3, 3, 1, 4, 1, 5, 9, 2, 6, 5, 3]\nignore Q\n";
+    for (number, (law, f)) in laws.iter().enumerate() {
+        for case in 0..12 {
+            // Starts and rates whose jumps are at no time that could be rounded to another.
+            let start = f64::from((number as i32 * 7 + case * 13) % 50 * 83 - 1990) / 1000.0;
+            let rate = f64::from(if case % 2 == 0 { 413 + 61 * case } else { -389 - 67 * case }) / 500.0;
+            let [first, last, changes] = counted_through(start, rate, f);
+            let drift = if case % 3 == 0 { " + 0*sin(x)" } else { "" };
+            let condition =
+                if case % 4 < 2 { format!("({law}) != n") } else { format!("({law}) > n | ({law}) < n") };
+            // The same in a module of its own, and read from a neighbour; y makes a sum of what is neither.
+            let alone = format!(
+                "{q}initial string: A({start}, {first}, 0, 0)\nA(x, n, k, y):\n  solve dx/dt = {rate}{drift}\n  if {condition} produce A(x, ({law}), k + 1, y)"
+            );
+            let beside = format!(
+                "{q}initial string: X({start}, 0) A({first}, 0)\nX(x, y): solve dx/dt = {rate}{drift}\nX(x, y) < A(n, k): if {condition} produce A(({law}), k + 1)"
+            );
+            let tuple = |text: &str, place: usize| {
+                let string = at(text, 3.0);
+                let counter = string.iter().find(|m| m.0 == "A").expect("it is there");
+                [counter.1[place], counter.1[place + 1]]
+            };
+            assert_eq!(tuple(&alone, 1), [last, changes], "{alone}");
+            assert_eq!(tuple(&beside, 0), [last, changes], "{beside}");
+        }
+    }
+}
+
+#[test]
+fn whole_parts_of_sums_of_what_moves_are_counted_once() {
+    for (rate, drift) in [(0.71, ""), (-0.83, ""), (0.71, " + 0*sin(x)"), (-0.83, " + 0*sin(x)")] {
+        for (name, whole) in [("floor", f64::floor as fn(f64) -> f64), ("ceil", f64::ceil)] {
+            for (start, other) in [(0.31, 0.2), (-1.27, -0.35), (1.9, 0.05)] {
+                // Their sum moves from start + 0.4.
+                let [first, last, changes] = counted_through(start + 0.4, rate + other, &|sum| whole(sum));
+                let movers = format!("dx/dt = {rate}{drift}");
+                let sums = [
+                    (
+                        format!("{name}(p + z)"),
+                        format!(
+                            "initial string: X({start}) A({first}, 0, 0.4)\nX(x): solve {movers}\nX(p) < A(n, k, z):\n  solve dz/dt = {other}\n"
+                        ),
+                    ),
+                    (
+                        format!("{name}(sum(M(w): w))"),
+                        format!(
+                            "initial string: A({first}, 0, 0) [ M_a({start}) ] M_b(0.4)\nM_a(x): solve {movers}\nM_b(x): solve dx/dt = {other}\nA(n, k, z):\n"
+                        ),
+                    ),
+                ];
+                for (sum, rules) in sums {
+                    let text = format!("{rules}  if {sum} != n produce A({sum}, k + 1, z)");
+                    for method in [Method::Auto, Method::Dop853, Method::Radau] {
+                        let settings = Settings { method, ..Settings::default() };
+                        let string = run(&text, settings, &[3.0])
+                            .unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"))
+                            .remove(0);
+                        let counter = string.iter().find(|m| m.0 == "A").expect("it is there");
+                        assert_eq!(counter.1[..2], [last, changes], "{method:?}: {text}");
+                    }
+                }
+            }
+        }
+    }
+    // As many modules as the whole part has changed by: what is handed on is the value of the instant, not a rounding of it.
+    let text = "ignore F\ninitial string: C(-3, 3, 0)\nC(x, n, k):\n  solve dx/dt = -2\n  if ceil(-x) != n produce C(x, ceil(-x), k + 1) for i in 1 .. abs(ceil(-x) - n): ( F(ceil(-x)) )\ninterpret F(a): ε";
+    let string = at(text, 2.25);
+    assert_eq!(string[0].1[1..], [8.0, 5.0]);
+    assert_eq!(string.len(), 6);
+}

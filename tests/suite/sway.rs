@@ -290,6 +290,33 @@ fn a_birth_at_a_tick_is_no_blow() {
     }
 }
 
+/// Widths in proportion to lengths: a stem that is born with 1e-16 m at a tick, or a little before it, is 1e13 times as thick at the next.
+#[test]
+fn a_stem_may_be_born_as_small_as_it_likes() {
+    let swaying = |birth: f64, size: f64| {
+        let text = format!(
+            "wind 1, 0, 0.3 speed 2\ntissue w = stiffness 5e8, density 800, damping 0.1\n\
+             initial string: [ @E(w) S(0.06) S(0.03) A ]\nA: if age = {birth:?} produce S({size:?}) [ +(40) S({size:?}) ]\n\
+             S(x): solve dx/dt = 0.1\ninterpret S(x): !(0.05*x) F(x) [ +(40) @L(x) ]\ninterpret A: ε\n"
+        );
+        let session = read("young.dls", &text);
+        let [scene] = &scenes(&session, &[1.5])[..] else { unreachable!() };
+        points(scene)
+    };
+    // At a tick, a rounding before it, and shortly before it.
+    for birth in [28.0 / 30.0, 0.8999999999999999, 0.9333] {
+        let large = swaying(birth, 1e-9);
+        for size in [1e-12, 1e-16, 1e-18, 0.0] {
+            let small = swaying(birth, size);
+            assert_eq!(large.len(), small.len());
+            for (owner, point) in &large {
+                let off = (small[owner] - point).norm();
+                assert!(off < 1e-4, "born at {birth} with {size}, {owner:?} is {off} elsewhere");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_stem_that_cannot_be_followed_is_named_with_its_place() {
     const STORM: &str = "units length 0.1, time 2\nwind 1, 0, 0 speed 1e200\n\

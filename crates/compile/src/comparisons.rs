@@ -127,17 +127,9 @@ fn equal(graph: &mut Graph, step: NodeId, level: NodeId, is_steady: &dyn Fn(u32)
                 let found = signs.into_iter().find(|(sign, ..)| *sign == level);
                 return Some(found.map_or(zero, |(_, op, a, b)| graph.binary(op, a, b)));
             }
-            if !jumps(graph, x, level, is_steady) {
-                return None;
-            }
-            let one = |graph: &mut Graph, (sign, op, a, b): (f64, Binary, NodeId, NodeId)| {
-                let sign = graph.constant(sign);
-                let (is_so, holds) = (graph.binary(Binary::Eq, level, sign), graph.binary(op, a, b));
-                graph.binary(Binary::And, is_so, holds)
-            };
-            let [minus, rest, plus] = signs.map(|sign| one(graph, sign));
-            let one_of = graph.binary(Binary::Or, minus, rest);
-            Some(graph.binary(Binary::Or, one_of, plus))
+            sign_against(graph, (x, level), is_steady, |graph, sign, level| {
+                graph.binary(Binary::Eq, level, sign)
+            })
         }
         Node::Unary(Unary::Abs, x) if x == level => Some(ordered(graph, false, zero, x)),
         Node::Binary(op @ (Binary::Min | Binary::Max), x, y) if x == level || y == level => {
@@ -147,6 +139,26 @@ fn equal(graph: &mut Graph, step: NodeId, level: NodeId, is_steady: &dyn Fn(u32)
         }
         _ => None,
     }
+}
+
+/// A comparison of the sign of what moves with a level that rests: that of each of the three signs, where the sign is that one.
+fn sign_against(
+    graph: &mut Graph,
+    (x, level): (NodeId, NodeId),
+    is_steady: &dyn Fn(u32) -> bool,
+    compare: impl Fn(&mut Graph, NodeId, NodeId) -> NodeId,
+) -> Option<NodeId> {
+    if !jumps(graph, x, level, is_steady) {
+        return None;
+    }
+    let zero = graph.constant(0.0);
+    let mut one = |sign: f64, op: Binary, a: NodeId, b: NodeId| {
+        let sign = graph.constant(sign);
+        let (is_so, holds) = (graph.binary(op, a, b), compare(graph, sign, level));
+        graph.binary(Binary::And, holds, is_so)
+    };
+    let each = [one(-1.0, Binary::Lt, x, zero), one(0.0, Binary::Eq, x, zero), one(1.0, Binary::Lt, zero, x)];
+    each.into_iter().reduce(|all, next| graph.binary(Binary::Or, all, next))
 }
 
 /// `step < level`, or `step <= level`.
@@ -167,7 +179,12 @@ fn below(
             Some(ordered(graph, is_floor, x, end))
         }
         Node::Unary(Unary::Sign, x) => {
-            let (level, zero) = (graph.as_constant(level)?, graph.constant(0.0));
+            let zero = graph.constant(0.0);
+            let Some(level) = graph.as_constant(level) else {
+                return sign_against(graph, (x, level), is_steady, |graph, sign, level| {
+                    ordered(graph, is_strict, sign, level)
+                });
+            };
             let holds = |sign: f64| if is_strict { sign < level } else { sign <= level };
             match [-1.0, 0.0, 1.0].map(holds) {
                 [true, false, false] => Some(ordered(graph, true, x, zero)),
@@ -194,6 +211,13 @@ fn above(
     is_strict: bool,
     is_steady: &dyn Fn(u32) -> bool,
 ) -> Option<NodeId> {
+    if let Node::Unary(Unary::Sign, x) = graph.node(step)
+        && graph.as_constant(level).is_none()
+    {
+        return sign_against(graph, (x, level), is_steady, |graph, sign, level| {
+            ordered(graph, is_strict, level, sign)
+        });
+    }
     let opposite = below(graph, step, level, !is_strict, is_steady)?;
     match graph.node(opposite) {
         Node::Binary(op @ (Binary::Lt | Binary::Le), x, y) => Some(ordered(graph, op == Binary::Le, y, x)),

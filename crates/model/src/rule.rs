@@ -53,6 +53,8 @@ pub struct Rule {
     pub boundaries: Vec<Boundary>,
     /// By atom: true if it is a part of a comparison of a whole part or a sign, which jumps where the sides of the atom meet.
     pub jumping: Vec<bool>,
+    /// By atom: true if a side jumps, and the comparison could not be taken apart into comparisons of what moves.
+    pub jumping_whole: Vec<bool>,
     /// The `solve` clauses in the order written; the first whose condition holds is active.
     pub solves: Vec<Solve>,
     /// The `produce` clauses in the order written; of those whose conditions hold at one instant, the first applies.

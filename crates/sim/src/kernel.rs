@@ -303,6 +303,10 @@ impl<'m> Simulation<'m> {
         if let Some(id) = oldest {
             self.check_pace(id)?;
         }
+        if oldest.is_none() && self.events.is_idle() {
+            // All that was due has turned out to be a little later.
+            return Ok(());
+        }
         let before = self.log.stats.events;
         prefetch_events(&self.world, &self.neighbours, self.schedule.soon());
         self.event_stage().iterate()?;

@@ -28,6 +28,8 @@ pub struct Setup<'m> {
     pub levels_decide: Vec<bool>,
     /// By rule and production: something jumps in its condition or its successors.
     pub jumps: Vec<Vec<bool>>,
+    /// By rule: some comparison jumps.
+    pub has_jumps: Vec<bool>,
     /// Neighbours are remembered.
     pub hands_on: bool,
     /// Some rule has an aggregate.
@@ -60,6 +62,7 @@ impl<'m> Setup<'m> {
             rule.produces.iter().flat_map(|produce| produce.outcome.reads()).any(|v| context.contains(&v))
         });
         let is_discrete = model.rules.iter().any(|rule| rule.discrete);
+        let has_jumps = |rule: &Rule| rule.jumping.contains(&true) || rule.jumping_whole.contains(&true);
         Setup {
             model,
             settings,
@@ -73,6 +76,7 @@ impl<'m> Setup<'m> {
             successors_read_context: successors_read_context.collect(),
             levels_decide: model.rules.iter().map(levels_decide).collect(),
             jumps: model.rules.iter().map(jumps).collect(),
+            has_jumps: model.rules.iter().map(has_jumps).collect(),
             hands_on,
             gathers,
             plain: !hands_on && !gathers && !is_algebraic && !is_discrete && !settings.transitions,
@@ -113,16 +117,8 @@ fn asks_for_jumps(rule: &Rule, produce: &Produce) -> bool {
 
 /// By production: something jumps in its condition or its successors.
 fn jumps(rule: &Rule) -> Vec<bool> {
-    // What jumps in a condition that was not taken apart has no side on which it could be looked at: its instant is known to rounding only.
-    let is_whole = |produce: &Produce| {
-        let mut atoms = produce.guard.atoms();
-        atoms.any(|(atom, _)| {
-            let [a, b] = [2 * atom, 2 * atom + 1].map(|side| rule.sides.output_jumps(side));
-            !rule.jumping[atom] && (a || b)
-        })
-    };
-    let jumps = |produce: &Produce| {
-        !is_whole(produce) && (asks_for_jumps(rule, produce) || produce.outcome.jump_reads().next().is_some())
-    };
+    let asks = |produce: &Produce| produce.guard.atoms().any(|(atom, _)| rule.jumping_whole[atom]);
+    let makes = |produce: &Produce| produce.outcome.jump_reads().next().is_some();
+    let jumps = |produce: &Produce| asks_for_jumps(rule, produce) || asks(produce) || makes(produce);
     rule.produces.iter().map(jumps).collect()
 }

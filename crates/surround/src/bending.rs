@@ -14,7 +14,7 @@ use dlsys_model::Model;
 use dlsys_sway::{self as sway, Solver, State, Vector, Wind, hermite};
 use dlsys_tree::ModuleString;
 
-use crate::body::{Body, roll, rolled};
+use crate::body::{Body, kept, roll, rolled};
 use crate::classes::{ByModes, Modal};
 use crate::descent::Descent;
 use crate::flights::Flown;
@@ -140,6 +140,8 @@ impl Tick {
             let Some(&known) = known else { continue };
             let before = &self.body.stems[known];
             let (strain, rate) = self.strain(known, time);
+            let kept = kept(before.width, stem.width);
+            let (strain, rate) = (strain * kept, rate * kept);
             if module == stem.key.module {
                 // The stem itself; one more of the same module is new.
                 return (before.key == stem.key).then_some((strain, rate));
@@ -187,14 +189,17 @@ impl BentStems {
 }
 
 impl Strains for BentStems {
-    fn strain(&self, stem: StemKey) -> Vector {
+    fn strain(&self, stem: StemKey, width: f64) -> Vector {
         let frozen = self.flown.frozen.get(&stem).filter(|(since, _)| *since <= self.time);
         if let Some((_, strain)) = frozen {
             return *strain;
         }
         let new = self.new.as_ref().and_then(|new| new.get(&stem).copied());
         // One that has just been let go is none of the stems of its string.
-        let known = || Some(self.tick.strain(*self.tick.body.numbers.get(&stem)?, self.time).0);
+        let known = || {
+            let number = *self.tick.body.numbers.get(&stem)?;
+            Some(self.tick.strain(number, self.time).0 * kept(self.tick.body.stems[number].width, width))
+        };
         new.or_else(known).unwrap_or_else(Vector::zeros) * self.metre
     }
 

@@ -191,7 +191,7 @@ impl<'m> Flights<'m> {
                 return Err(Error::TooManyParts { most: MOST_PARTS, time: place.time_at(time), span });
             }
             for stem in &part.stems {
-                let strain = turtle::Strains::strain(strains, stem.key);
+                let strain = turtle::Strains::strain(strains, stem.key, stem.width);
                 if strain != Vector::zeros() {
                     Arc::make_mut(&mut self.frozen).insert(stem.key, (time, strain));
                 }

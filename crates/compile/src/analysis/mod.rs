@@ -188,6 +188,12 @@ fn aggregates(graph: &mut Graph, moving: &Moving, index: usize, rule: &ResolvedR
     all
 }
 
+/// By atom: true if a side jumps, and the comparison was not taken apart.
+fn jumping_whole(sides: &Program, jumping: &[bool]) -> Vec<bool> {
+    let jumps = |atom: usize| sides.output_jumps(2 * atom) || sides.output_jumps(2 * atom + 1);
+    jumping.iter().enumerate().map(|(atom, apart)| !apart && jumps(atom)).collect()
+}
+
 /// The variables that the sides of an atom read, ascending.
 fn atom_reads(sides: &Program, atom: usize) -> Vec<usize> {
     let mut reads = [2 * atom, 2 * atom + 1].map(|side| sides.output_reads(side)).concat();
@@ -222,6 +228,7 @@ fn compile_rule(
         right,
         right_shape: declared.right_shape,
         atom_reads: (0..declared.atoms.len()).map(|atom| atom_reads(&sides, atom)).collect(),
+        jumping_whole: jumping_whole(&sides, &declared.jumping),
         watched: watched(&sides, &aggregates, count, declared.first_aggregate),
         aggregates,
         first_aggregate: declared.first_aggregate,

@@ -46,8 +46,8 @@ pub struct PartKey {
 /// How far the stems of a string are from their shapes at rest, and where the parts are that it has let go.
 pub trait Strains {
     /// The strain of a stem beyond that of its shape at rest: rotation about its heading, left and up, in radians per scene unit.
-    /// Zero for a stem that is not known.
-    fn strain(&self, stem: StemKey) -> Vector;
+    /// Zero for a stem that is not known. `width` is that of the stem as it is drawn, in scene units.
+    fn strain(&self, stem: StemKey, width: f64) -> Vector;
 
     /// Where the turtle stands at the `@D` of a part that has been let go; `None` for one that is not known, which stays where the branch
     /// holds it.

@@ -23,6 +23,12 @@ const POLE: f64 = 1e8;
 /// Residue that numerical trajectories may leave of zero, relative to the size of the sides or to 1.
 const NOISE: f64 = 1e-10;
 
+/// What moves over a jump has left it for good when it has moved by so many times its rounding,
+const BLUR: f64 = 64.0;
+
+/// or, if it is slow, after this part of the present time, or of 1.
+const LONGEST_BLUR: f64 = 1e-10;
+
 /// Detects zero crossings along paths. The fields are working memory: a search allocates nothing once they have grown.
 #[derive(Clone, Debug, Default)]
 pub struct CrossingDetector {
@@ -251,6 +257,9 @@ impl CrossingDetector {
         // resolution of time.
         let (mut from, mut tolerance) = (from, tolerance);
         let start = self.difference(path, atom).value(from);
+        if path.rule.jumping_whole[atom] && sign == Sign::Zero && start == 0.0 {
+            from = (from + self.blur(path, atom)).min(limit);
+        }
         if sign != Sign::Any && start != 0.0 && start * sign_of(sign) <= 0.0 {
             let size = self.out[2 * atom].abs().max(1.0);
             let soon = (from + 4.0 * path.start.resolution() / path.h).min(limit);
@@ -290,6 +299,17 @@ impl CrossingDetector {
             _ => return None,
         };
         (variable <= path.rule.time_variable()).then_some((variable, level))
+    }
+
+    /// The time, in units of the path's length, within which rounding may make something jump to and fro that moves over a jump: until every
+    /// value has moved by more than its rounding.
+    fn blur(&mut self, path: &Path, atom: usize) -> f64 {
+        path.departure(&mut self.departure);
+        let moves = path.rule.atom_reads[atom].iter().map(|variable| self.departure[*variable]);
+        let times =
+            moves.filter(|x| x.rate != 0.0).map(|x| BLUR * f64::EPSILON * x.value.abs() / x.rate.abs());
+        let longest = LONGEST_BLUR * path.start.to_f64().abs().max(1.0) / path.h;
+        times.fold(BLUR * path.start.resolution() / path.h, f64::max).min(longest)
     }
 
     /// The effect of the rounding of the variables on the difference of two sides; 0 where the difference jumps.

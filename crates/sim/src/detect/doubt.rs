@@ -114,14 +114,15 @@ impl CrossingDetector {
         let is_far = start.abs() > FAR * query.error * size;
         let noise = if is_far { 0.0 } else { self.noise(path, atom, query.from) };
         // The value of a neighbour is approached only numerically, and rounding may make the sides equal at last.
-        let around = path.rule.reads_context && !path.state.context.is_empty() && query.decides;
+        let around = path.rule.reads_context
+            && !path.state.context.is_empty()
+            && query.decides
+            && !path.rule.jumping_whole[atom];
         let noise = if around { noise.max(BLUR * tolerance) } else { noise };
         // Equations change where their conditions do, however near that is: only a wrong sign waits.
         let in_band = start.abs() <= noise && (query.decides || start <= 0.0);
-        if noise > tolerance
-            && in_band
-            && let Some(ahead) = self.leave_band(path, &mut query, start, noise)
-        {
+        let begins_inside = noise > tolerance && in_band;
+        if begins_inside && let Some(ahead) = self.leave_band(path, &mut query, start, noise) {
             return ahead;
         }
         let next = self.root(path, atom, query.from, limit, sign, tolerance);
@@ -147,8 +148,9 @@ impl CrossingDetector {
         if noise <= tolerance {
             return Lookahead::crossing(next);
         }
-        // What begins on the boundary has no error there, and soon more than its distance: it does not come near, it comes from there.
-        if start.abs() <= tolerance
+        // What begins on the boundary, or near it, has no or less error there, and soon more than its distance: it does not come near,
+        // it comes from there.
+        if (begins_inside || start.abs() <= tolerance)
             && let Some(ahead) = self.leave_band(path, &mut query, start, noise)
         {
             return ahead;
@@ -308,7 +310,11 @@ impl CrossingDetector {
         let sides = &path.rule.sides;
         self.around_out.resize(sides.outputs(), Interval::EMPTY);
         sides.eval(&self.around, &mut self.whole_scratch, &mut self.around_out);
-        half_width(self.around_out[2 * atom], self.around_out[2 * atom + 1])
+        let (a, b) = (self.around_out[2 * atom], self.around_out[2 * atom + 1]);
+        let width = half_width(a, b);
+        // A wider one is that of a jump.
+        let is_jump = || width > FAR * path.error() * a.magnitude().max(b.magnitude()).max(1.0);
+        if path.rule.jumping_whole[atom] && is_jump() { 0.0 } else { width }
     }
 
     /// True if the sides of an atom approach each other over the path, and are at its start no further apart than

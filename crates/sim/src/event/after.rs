@@ -36,6 +36,13 @@ fn just_after(at: Option<f64>, near: f64, far: f64) -> f64 {
     at.filter(|at| (limit - at).abs() <= SAME * at.abs().max(limit.abs())).unwrap_or(limit)
 }
 
+/// The value at the instant of the moving variable that a parameter is, if it is one a little later: where the successor has other modules at
+/// the instant, what is handed on would else get a rounding of itself, perhaps on the other side of the jump.
+fn handed_on(near: f64, variables: &[f64], later: &[f64]) -> Option<f64> {
+    let mut moving = variables.iter().zip(later).filter(|(at, later)| at != later);
+    moving.find(|(_, later)| **later == near).map(|(at, _)| *at)
+}
+
 impl EventStage<'_, '_> {
     /// The production of a rule that holds, with these signs, at the instant. Once what jumps has jumped, no whole part and no sign there
     /// tells anything.
@@ -78,7 +85,11 @@ impl EventStage<'_, '_> {
         if let Some((_, far)) = alike(far) {
             let at = alike(at).map(|(_, at)| at.arguments);
             for (i, near) in made.arguments.iter_mut().enumerate() {
-                *near = just_after(at.as_ref().map(|at| at[i]), *near, far.arguments[i]);
+                let at = match &at {
+                    Some(at) => Some(at[i]),
+                    None => handed_on(*near, &variables, &later[0]),
+                };
+                *near = just_after(at, *near, far.arguments[i]);
             }
         }
         out.kinds.append(&mut made.kinds);

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use smallvec::SmallVec;
 
 use super::chance::{self, Undrawn};
-use super::matching::put_levels;
+use super::levels::{put_levels, set_levels};
 use super::{EventStage, Firing};
 use crate::budget;
 use crate::error::{Error, Site};
@@ -16,7 +16,6 @@ use crate::world::World;
 use crate::world::context::Context;
 use crate::world::life::{End, LifeClass};
 use crate::world::new_modules::kinds_of;
-use crate::world::state::Level;
 use dlsys_model::{Comparison, KindId, Model, Rule, Sign};
 use dlsys_tree::{Lineage, ModuleId};
 
@@ -63,40 +62,6 @@ pub fn residual(rule: &Rule, produce: usize, zero: impl Fn(usize) -> bool, scrat
         .filter(|(atom, comparison)| *comparison == Comparison::Equal || zero(*atom))
         .map(|(atom, _)| (sides[2 * atom] - sides[2 * atom + 1]).abs())
         .fold(0.0, f64::max)
-}
-
-/// Most steps of rounding by which a level is moved, so that the sides that meet there are equal.
-const MOST_ULPS: u32 = 8;
-
-/// Gives the variables that meet a level their levels, not roundings of them. Where they `decide` over something that jumps in a successor,
-/// the sides that meet there are equal to the last bit, if they can be: `3.4*x` is 2 where it reaches 2, and not a little less.
-fn set_levels(world: &World, fire: &Firing, (rule, decide): (&Rule, bool), scratch: &mut Scratch) {
-    let Some(state) = world.state(fire.id).filter(|state| state.rule == Some(fire.rule)) else { return };
-    let Scratch { variables, registers, .. } = scratch;
-    for &Level { atom, variable, value, after } in state.open.iter().flat_map(|open| &open.levels) {
-        if !decide {
-            // The time is known to the last digit as it is.
-            if variable != rule.time_variable() {
-                variables[variable] = value;
-            }
-            continue;
-        }
-        let mut sides = vec![0.0; rule.sides.outputs()];
-        let mut sign_with = |candidate: f64| {
-            variables[variable] = candidate;
-            rule.sides.eval(variables, registers, &mut sides);
-            Sign::of(sides[2 * atom] - sides[2 * atom + 1])
-        };
-        let (mut up, mut down, mut all) = (value, value, vec![value]);
-        for _ in 0..MOST_ULPS {
-            (up, down) = (up.next_up(), down.next_down());
-            all.extend([up, down]);
-        }
-        // Where rounding makes them unequal everywhere, they are on the side that comes.
-        let mut with = |sign: Sign| all.iter().copied().find(|candidate| sign_with(*candidate) == sign);
-        let equal = with(Sign::Zero).or_else(|| with(after));
-        variables[variable] = equal.unwrap_or(value);
-    }
 }
 
 impl EventStage<'_, '_> {

@@ -109,7 +109,8 @@ impl EventStage<'_, '_> {
             }
             let state = world.state(id)?;
             let (rule, open) = (state.rule?, state.open.as_ref()?);
-            Some(Firing::at(id, rule, self.production_at(rule, &open.at)?))
+            let produce = self.production_at(rule, &open.at)?;
+            Some(Firing { id, rule, produce, after: open.behind && self.setup.jumps[rule][produce] })
         }));
         firing
     }

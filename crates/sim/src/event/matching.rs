@@ -3,12 +3,13 @@
 use smallvec::SmallVec;
 
 use super::EventStage;
+use super::levels::put_levels;
 use crate::detect::crossing::TOUCH;
 use crate::detect::signs::{EQUAL, NEAR, noise, opposite};
 use crate::world::context::Context;
 use crate::world::state::Signs;
 use dlsys_model::{ContextPart, Pattern, Rule, Sign};
-use dlsys_tree::{ModuleId, Tree};
+use dlsys_tree::ModuleId;
 
 /// The place of the bracket that closes the first one.
 fn closing(shape: &[ContextPart]) -> usize {
@@ -22,32 +23,6 @@ fn closing(shape: &[ContextPart]) -> usize {
         }
     }
     shape.len()
-}
-
-/// A value that is further from a level than this part of it, or of 1, has left it since.
-const LEFT: f64 = 1e-12;
-
-/// Puts the levels that parameters of a module's context meet at this instant among the variables of its rule; a value that has jumped at the
-/// instant meets none any more.
-pub fn put_levels(
-    met: &[(ModuleId, usize, f64)],
-    (tree, id): (&Tree, ModuleId),
-    around: &Context,
-    variables: &mut [f64],
-) {
-    if met.is_empty() {
-        return;
-    }
-    let mut first = tree.parameters(id).len();
-    for &module in around.context() {
-        for &(_, parameter, level) in met.iter().filter(|met| met.0 == module) {
-            let value: &mut f64 = &mut variables[first + parameter];
-            if (*value - level).abs() <= LEFT * level.abs().max(1.0) {
-                *value = level;
-            }
-        }
-        first += tree.parameters(module).len();
-    }
 }
 
 impl EventStage<'_, '_> {

@@ -16,6 +16,7 @@
 
 mod after;
 mod apply;
+mod behind;
 pub mod chance;
 mod consistency;
 mod cut;
@@ -23,6 +24,7 @@ pub mod derivation;
 mod exact;
 mod iterate;
 mod lazy;
+mod levels;
 mod lookup;
 mod matching;
 mod modes;
@@ -119,6 +121,11 @@ impl Events {
             recorder: (settings.log && settings.transitions).then(Recorder::default),
             ..Events::default()
         }
+    }
+
+    /// True if the instant concerns no module.
+    pub fn is_idle(&self) -> bool {
+        self.opened.is_empty() && self.firing.is_empty() && self.firing_lazy.is_empty() && !self.steps.due
     }
 }
 

@@ -2,6 +2,7 @@
 
 use smallvec::SmallVec;
 
+use super::behind::When;
 use super::{EventStage, Firing};
 use crate::error::Error;
 use crate::flow::prediction::{PredictedEnd, Prediction, predict};
@@ -47,7 +48,7 @@ impl EventStage<'_, '_> {
                         self.events.firing.push(firing);
                         Some(id)
                     }
-                    None => Some(self.touch_scheduled(slot as usize)?),
+                    None => self.touch_scheduled(slot as usize)?,
                 },
             };
             oldest = oldest.or(first);
@@ -129,8 +130,8 @@ impl EventStage<'_, '_> {
         }
     }
 
-    /// Opens a module whose event it is.
-    pub fn touch_scheduled(&mut self, slot: usize) -> Result<ModuleId, Error> {
+    /// Opens a module whose event it is; None if the event turns out to be a little later.
+    pub fn touch_scheduled(&mut self, slot: usize) -> Result<Option<ModuleId>, Error> {
         let state = self.world.states[slot].as_mut().expect("scheduled");
         let id = state.id;
         if state.next.kind == NextKind::Doubt {
@@ -150,10 +151,20 @@ impl EventStage<'_, '_> {
             }
             return Err(error);
         }
-        let touched = state.next.take_touched();
+        let kind = state.next.kind;
+        let mut touched = state.next.take_touched();
+        let when = self.behind_jumps(id, &mut touched);
+        if let When::Later(time) = when {
+            self.world.states[slot].as_mut().expect("scheduled").next.touch(kind, touched);
+            self.schedule.schedule(Owner::Module(slot as u32), time);
+            return Ok(None);
+        }
         self.flow().learn(id);
         self.touch(id, &touched);
-        Ok(id)
+        if let (When::Behind, Some(state)) = (when, self.world.state_mut(id)) {
+            open(state).behind = true;
+        }
+        Ok(Some(id))
     }
 
     /// Begins the life of a newborn module by its prediction; false if it has none.
@@ -204,7 +215,7 @@ impl EventStage<'_, '_> {
             return None;
         }
         let (id, rule) = (state.id, state.rule?);
-        if self.setup.levels_decide[rule] {
+        if self.setup.levels_decide[rule] || self.setup.has_jumps[rule] {
             return None;
         }
         if self.setup.kinds_with_context[self.world.tree.kind(id).index()] || !state.next.changes().is_empty()

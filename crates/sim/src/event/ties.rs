@@ -1,6 +1,7 @@
 //! Ties: two modules of which one sees the other, whose events happen at one instant in truth but at two as integrated.
 
 use super::EventStage;
+use super::behind::When;
 use crate::detect::doubt::FAR;
 use crate::detect::signs::{opposite, produces};
 use crate::flow::algebraic::is_algebraic;
@@ -30,8 +31,12 @@ impl EventStage<'_, '_> {
             let other = self.flows.error_of(self.world, id);
             for looker in self.lookers_through_values(id) {
                 if let Some(change) = self.tie(looker, other) {
+                    let mut changes = [change];
+                    if let When::Later(_) = self.behind_jumps(looker, &mut changes) {
+                        continue;
+                    }
                     let before = self.events.opened.len();
-                    self.touch(looker, &[change]);
+                    self.touch(looker, &changes);
                     known = if self.events.opened.len() > before && known > before { before } else { known };
                 }
             }

@@ -201,6 +201,8 @@ pub struct Open {
     pub flips: usize,
     /// The number of the last choice at the instant that gave it other equations; see [`modes`](crate::event).
     pub chosen: usize,
+    /// The instant has been put behind a jump.
+    pub behind: bool,
     /// No side is near the other: signs are what they are.
     pub clear: bool,
     /// The variables that meet a level at the instant: what follows from that gets the level, not a rounding of it.

@@ -122,7 +122,7 @@ impl Walk<'_> {
             }
         }
         self.state.joined = Some(number);
-        Ok(Some(self.strains.map_or_else(Vector::zeros, |strains| strains.strain(key))))
+        Ok(Some(self.strains.map_or_else(Vector::zeros, |strains| strains.strain(key, width))))
     }
 
     /// Notes where the stem that has been drawn ends.

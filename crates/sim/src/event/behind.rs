@@ -1,0 +1,179 @@
+//! The instant behind a jump.
+//!
+//! `if floor(x)*2 + 1 != n produce A(floor(x)*2 + 1)`: the difference of the sides is not zero where x reaches a whole number, it
+//! jumps there. The instant of a jump is known to rounding only, and at a time a rounding too early the condition does not hold, and a
+//! successor gets the value from before. So the event takes place at the first time at which the condition holds by the numbers that
+//! the successor is computed from. The same goes for `floor(p + z) != n`, where the sides that meet, `p + z` and `n + 1`, meet in no
+//! variable that could be given the value at the level.
+
+use super::EventStage;
+use super::levels::put_levels;
+use crate::world::state::{Change, Signs};
+use dlsys_expr::Dual;
+use dlsys_model::{Comparison, Model, Rule, Sign, Truth};
+use dlsys_tree::{ModuleId, SimTime};
+
+/// No event is put off by more than this part of the present time, or of 1: then what jumps moves less than its rounding.
+const LONGEST_DELAY: f64 = 1e-6;
+
+/// And none by less: near t = 0 the resolution of time is so fine that what has moved is less than the smallest normal number.
+const SHORTEST_DELAY: f64 = 1e-18;
+
+/// When the event of a module takes place.
+pub(super) enum When {
+    /// Now.
+    Now,
+    /// Now, behind a jump: the signs at the instant are those by the numbers of now.
+    Behind,
+    /// Not before then.
+    Later(SimTime),
+}
+
+/// The question whether a production holds, as a function of the signs of what jumps.
+struct Question<'r> {
+    rule: &'r Rule,
+    /// The signs just before the instant.
+    before: Signs,
+    touched: Vec<Change>,
+    /// By change: it is that of a jump.
+    jumps: Vec<bool>,
+}
+
+impl Question<'_> {
+    /// True if some production holds, where the touched atoms have such signs.
+    fn holds_with(&self, sign: impl Fn(usize) -> Sign) -> bool {
+        let of = |atom: usize| match self.touched.iter().position(|change| change.atom == atom) {
+            Some(place) => sign(place),
+            None => self.before[atom],
+        };
+        self.rule.produces.iter().any(|produce| produce.guard.judge(of) == Truth::Yes)
+    }
+
+    /// True if a production holds just after the instant.
+    fn follows(&self) -> bool {
+        self.holds_with(|place| self.touched[place].after)
+    }
+
+    /// True if a production holds at the instant or just after it, where what jumps has these signs.
+    fn holds(&self, signs: &[Sign]) -> bool {
+        let of = |place: usize, other: Sign| if self.jumps[place] { signs[place] } else { other };
+        self.holds_with(|place| of(place, self.touched[place].at))
+            || self.holds_with(|place| of(place, self.touched[place].after))
+    }
+}
+
+impl<'m> EventStage<'_, 'm> {
+    /// True if the instant of a change of sign has to be put behind a jump.
+    fn is_jump(&self, rule: usize, change: &Change) -> bool {
+        let (of_rule, atom) = (&self.setup.model.rules[rule], change.atom);
+        if of_rule.jumping_whole[atom] {
+            return true;
+        }
+        // The sign of zero is zero at an instant only.
+        let mut compared = of_rule.produces.iter().flat_map(|produce| produce.guard.atoms());
+        of_rule.jumping[atom]
+            && change.level.is_none_or(|(variable, _)| variable >= of_rule.first_aggregate)
+            && !compared.any(|compared| compared == (atom, Comparison::Equal))
+    }
+
+    /// When the event of a module takes place whose signs change so, by the numbers of now and of a little later. The signs at the
+    /// instant become those by the numbers, where that is now.
+    pub(super) fn behind_jumps(&mut self, id: ModuleId, touched: &mut [Change]) -> When {
+        let Some(rule) = self.world.state(id).and_then(|state| state.rule) else { return When::Now };
+        if !self.setup.has_jumps[rule] {
+            return When::Now;
+        }
+        self.level_signs(id, rule, touched);
+        let jumps: Vec<bool> = touched.iter().map(|change| self.is_jump(rule, change)).collect();
+        if !jumps.contains(&true) {
+            return When::Now;
+        }
+        let question = self.question(id, rule, touched, jumps);
+        if !question.follows() {
+            return When::Now;
+        }
+        let at = self.instant.at;
+        // Of numbers below the normal ones parts are lost.
+        let is_normal = at.to_f64() == 0.0 || at.to_f64().abs() >= SHORTEST_DELAY;
+        let now = self.signs_by_numbers(id, rule, touched);
+        if is_normal && question.holds(&now) {
+            return self.at_the_numbers(touched, &question.jumps, &now);
+        }
+        let longest = LONGEST_DELAY * at.to_f64().abs().max(1.0);
+        let waited = touched.iter().map(|change| at.since(change.time)).fold(0.0, f64::max);
+        let mut delay = at.resolution().max(SHORTEST_DELAY).max(waited);
+        self.flows.known_rates.clear();
+        while delay <= longest {
+            if question.holds(&self.signs_later(id, rule, touched, delay)) {
+                return When::Later(at.after(delay));
+            }
+            delay *= 2.0;
+        }
+        When::Now
+    }
+
+    /// Gives signs that are zero at the instant, of differences of several variables that move, a variable and its number at which
+    /// they are.
+    fn level_signs(&mut self, id: ModuleId, rule: usize, touched: &mut [Change]) {
+        let of_rule = &self.setup.model.rules[rule];
+        for change in touched.iter_mut().filter(|change| of_rule.jumping[change.atom]) {
+            if change.level.is_none() && change.at == Sign::Zero && !self.is_jump(rule, change) {
+                change.level = self.meeting(id, of_rule, change.atom);
+            }
+        }
+    }
+
+    /// What the production of a module depends on whose signs change so.
+    fn question(&self, id: ModuleId, rule: usize, touched: &[Change], jumps: Vec<bool>) -> Question<'m> {
+        let model: &'m Model = self.setup.model;
+        let state = self.world.state(id).expect("scheduled");
+        let mut before = Signs::from_slice(&state.signs);
+        let passed = |change: &&Change| change.time.since(self.instant.at) <= 0.0;
+        for change in state.next.changes().iter().filter(passed) {
+            before[change.atom] = change.after;
+        }
+        Question { rule: &model.rules[rule], before, touched: touched.to_vec(), jumps }
+    }
+
+    /// Makes the signs of what jumps those by the numbers of now.
+    fn at_the_numbers(&mut self, touched: &mut [Change], jumps: &[bool], now: &[Sign]) -> When {
+        let mut is_behind = false;
+        for (place, change) in touched.iter_mut().enumerate().filter(|(place, _)| jumps[*place]) {
+            (change.at, change.level) = (now[place], None);
+            if now[place] != Sign::Zero {
+                change.after = now[place];
+                is_behind = true;
+            }
+        }
+        self.events.is_after |= is_behind;
+        if is_behind { When::Behind } else { When::Now }
+    }
+
+    /// The signs of differences by the numbers of now.
+    fn signs_by_numbers(&mut self, id: ModuleId, index: usize, touched: &[Change]) -> Vec<Sign> {
+        let rule = &self.setup.model.rules[index];
+        let state = self.world.state(id).expect("scheduled");
+        let variables = &mut self.scratch.variables;
+        self.world.variables(rule, id, &state.context, self.instant.at, variables);
+        put_levels(&self.events.met, (&self.world.tree, id), &state.context, variables);
+        for (variable, level) in touched.iter().filter_map(|change| change.level) {
+            if variable < rule.first_aggregate {
+                variables[variable] = level;
+            }
+        }
+        let mut sides = vec![0.0; rule.sides.outputs()];
+        rule.sides.eval(&self.scratch.variables, &mut self.scratch.registers, &mut sides);
+        touched.iter().map(|change| Sign::of(sides[2 * change.atom] - sides[2 * change.atom + 1])).collect()
+    }
+
+    /// The signs of differences a little later.
+    fn signs_later(&mut self, id: ModuleId, index: usize, touched: &[Change], delay: f64) -> Vec<Sign> {
+        let mut moving: Vec<Dual<f64>> = Vec::new();
+        self.flow().moving_variables(id, delay, &mut moving);
+        let values: Vec<f64> = moving.iter().map(|variable| variable.value).collect();
+        let rule = &self.setup.model.rules[index];
+        let mut sides = vec![0.0; rule.sides.outputs()];
+        rule.sides.eval(&values, &mut self.scratch.registers, &mut sides);
+        touched.iter().map(|change| Sign::of(sides[2 * change.atom] - sides[2 * change.atom + 1])).collect()
+    }
+}

@@ -1,0 +1,105 @@
+//! Levels that variables meet at an instant: whoever reads a variable then reads the level, and not a rounding of it.
+//!
+//! A successor that gets a value at its limit would else get a number a little beyond, or a whole part from before the jump.
+
+use super::{EventStage, Firing};
+use crate::scratch::Scratch;
+use crate::world::World;
+use crate::world::context::Context;
+use crate::world::state::Level;
+use dlsys_model::{Rule, Sign};
+use dlsys_tree::{ModuleId, Tree};
+
+/// A value that is further from a level than this part of it, or of 1, has left it since.
+const LEFT: f64 = 1e-12;
+
+/// Puts the levels that parameters of a module's context meet at this instant among the variables of its rule; a value that has jumped at the
+/// instant meets none any more.
+pub fn put_levels(
+    met: &[(ModuleId, usize, f64)],
+    (tree, id): (&Tree, ModuleId),
+    around: &Context,
+    variables: &mut [f64],
+) {
+    if met.is_empty() {
+        return;
+    }
+    let mut first = tree.parameters(id).len();
+    for &module in around.context() {
+        for &(_, parameter, level) in met.iter().filter(|met| met.0 == module) {
+            let value: &mut f64 = &mut variables[first + parameter];
+            if (*value - level).abs() <= LEFT * level.abs().max(1.0) {
+                *value = level;
+            }
+        }
+        first += tree.parameters(module).len();
+    }
+}
+
+/// Most steps of rounding by which a level is moved, so that the sides that meet there are equal.
+const MOST_ULPS: u32 = 8;
+
+/// Gives the variables that meet a level their levels, not roundings of them. Where they `decide` over something that jumps in a successor,
+/// the sides that meet there are equal to the last bit, if they can be: `3.4*x` is 2 where it reaches 2, and not a little less.
+pub fn set_levels(world: &World, fire: &Firing, (rule, decide): (&Rule, bool), scratch: &mut Scratch) {
+    let Some(state) = world.state(fire.id).filter(|state| state.rule == Some(fire.rule)) else { return };
+    for &Level { atom, variable, value, after } in state.open.iter().flat_map(|open| &open.levels) {
+        if !decide {
+            // The time is known to the last digit as it is.
+            if variable != rule.time_variable() {
+                scratch.variables[variable] = value;
+            }
+            continue;
+        }
+        let mut near = |sign: Sign| nearest(rule, (atom, variable), value, sign, scratch);
+        // Where rounding makes them unequal everywhere, they are on the side that comes.
+        let level = near(Sign::Zero).or_else(|| near(after)).unwrap_or(value);
+        scratch.variables[variable] = level;
+    }
+}
+
+/// The number nearest to a value, within some steps of rounding, with which the difference of an atom's sides has a sign. The variables in
+/// `scratch` are those of the rule; the one that is asked for is written over.
+fn nearest(
+    rule: &Rule,
+    (atom, variable): (usize, usize),
+    value: f64,
+    sign: Sign,
+    scratch: &mut Scratch,
+) -> Option<f64> {
+    let Scratch { variables, registers, .. } = scratch;
+    let mut sides = vec![0.0; rule.sides.outputs()];
+    let mut has_sign = |candidate: f64| {
+        variables[variable] = candidate;
+        rule.sides.eval(variables, registers, &mut sides);
+        Sign::of(sides[2 * atom] - sides[2 * atom + 1]) == sign
+    };
+    let (mut up, mut down) = (value, value);
+    let around = (0..MOST_ULPS).flat_map(|_| {
+        (up, down) = (up.next_up(), down.next_down());
+        [up, down]
+    });
+    std::iter::once(value).chain(around).find(|candidate| has_sign(*candidate))
+}
+
+impl EventStage<'_, '_> {
+    /// A variable of a module or of its context that moves, and the number at which the sides of an atom are equal; none if there is
+    /// none within the rounding of the numbers of now.
+    pub fn meeting(&mut self, id: ModuleId, rule: &Rule, atom: usize) -> Option<(usize, f64)> {
+        let mut moving = Vec::new();
+        self.flows.known_rates.clear();
+        self.flow().moving_variables(id, 0.0, &mut moving);
+        self.scratch.variables.clear();
+        self.scratch.variables.extend(moving.iter().map(|variable| variable.value));
+        let known = rule.first_aggregate;
+        let candidates = rule.atom_reads[atom].iter().copied();
+        candidates.filter(|variable| *variable < known && moving[*variable].rate != 0.0).find_map(
+            |variable| {
+                let value = moving[variable].value;
+                let level = nearest(rule, (atom, variable), value, Sign::Zero, self.scratch);
+                self.scratch.variables[variable] = value;
+                Some((variable, level?))
+            },
+        )
+    }
+}
