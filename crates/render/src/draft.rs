@@ -130,12 +130,16 @@ impl<'s> Draft<'s> {
 
     /// Of a triangle of which parts are cut out: where its corners lie in the picture, and that.
     pub(super) fn cut_out(&self, face: &Triangle) -> Option<([[f64; 2]; 3], &'s Texture)> {
+        let texture = self.holes(face)?;
+        Some((face.corners.map(|(vertex, _)| self.mesh.places[vertex as usize]), texture))
+    }
+
+    /// The picture on a triangle, if parts of it are cut out.
+    pub(super) fn holes(&self, face: &Triangle) -> Option<&'s Texture> {
         if self.mesh.places.is_empty() {
             return None;
         }
-        let texture = self.scene.palette.texture(face.material)?;
-        let places = face.corners.map(|(vertex, _)| self.mesh.places[vertex as usize]);
-        texture.picture.is_cut_out().then_some((places, texture))
+        self.scene.palette.texture(face.material).filter(|texture| texture.picture.is_cut_out())
     }
 
     /// How many triangles there are.

@@ -55,6 +55,7 @@ mod draft;
 mod error;
 mod exposure;
 mod extent;
+mod field;
 mod fit;
 mod floor;
 mod formats;
@@ -122,11 +123,6 @@ use dlsys_geometry::scene::Scene;
 /// Name and version of the program, for the header of files.
 pub const GENERATOR: &str = concat!("dlsys ", env!("CARGO_PKG_VERSION"));
 
-/// How much finer than in pixels surfaces are in drawings of vectors, which are looked at enlarged.
-const FINER: f64 = 2.0;
-/// How much larger or smaller than in the plane of focus surfaces are drawn with more or less detail.
-const MOST_MAGNIFIED: f64 = 100.0;
-
 /// The second pass: one frame after another, each as the bytes of its file.
 #[derive(Clone, Debug)]
 pub struct FrameWriter {
@@ -167,30 +163,21 @@ impl FrameWriter {
     /// Those of `out`.
     pub fn write_to(&self, scene: &Scene, title: &str, out: &mut (dyn Write + Send)) -> io::Result<()> {
         let content = self.format.content();
-        let flattened = match content {
-            Content::Pixels => Cow::Borrowed(scene),
-            Content::Vectors | Content::Mesh => scene.flattened(),
-        };
         // A mesh has no shadows.
         let whole = match content {
             Content::Pixels | Content::Vectors => self.fit.drawn(Cow::Borrowed(scene)),
             Content::Mesh => Cow::Borrowed(scene),
         };
+        let flattened;
         let scene = match content {
             // Pixels show no more detail than they have room for.
             Content::Pixels => Cow::Borrowed(&*whole),
             // Nor do regions of them.
-            Content::Vectors if self.fit.has_visible_regions() => {
-                let (fit, page) = self.fit.for_frame(&flattened, &self.page);
-                let [pixels, ..] = page.placement();
-                let scale = |at| {
-                    let nearer = fit.camera.magnification(fit.camera.project(at).z);
-                    pixels * nearer.clamp(1.0 / MOST_MAGNIFIED, MOST_MAGNIFIED)
-                };
-                let accuracy = |at| draft::accuracy(FINER * scale(at), fit.accuracy * pixels);
-                self.fit.drawn(flattened.drafted_scene(accuracy))
+            Content::Vectors if self.fit.has_visible_regions() => Cow::Borrowed(&*whole),
+            Content::Vectors | Content::Mesh => {
+                flattened = scene.flattened();
+                self.fit.drawn(flattened.tessellated(self.fit.accuracy))
             }
-            Content::Vectors | Content::Mesh => self.fit.drawn(flattened.tessellated(self.fit.accuracy)),
         };
         self.format.exporter().write(Drawing { scene: &scene, whole: &whole, writer: self, title }, out)
     }

@@ -52,7 +52,7 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
     let scene = &*scene.flattened();
     // The look must not change within an animation, so this does not depend on the frame.
     if style.fit.has_visible_regions() {
-        return trace::elements(scene, style, named, prefix);
+        return trace::elements(scene, None, style, named, prefix);
     }
     let names = named.then(|| Names::new(scene, '-'));
     let mut painter = Painter {

@@ -242,9 +242,7 @@ impl<'a> Shot<'a> {
             let (vertex, normal) = (self.places.len() as u32, self.normals.len() as u32);
             self.places.extend(ribbon.corners.iter().flatten().map(|&p| lens.place(p)));
             let [side, facing] = [ribbon.side, ribbon.facing].map(|v| lens.normal(v));
-            let [p, q] = [vertex, vertex + 1].map(|corner| self.places[corner as usize]);
-            let across = f64::from(q.x - p.x).hypot(f64::from(q.y - p.y));
-            let (aside, ahead) = if across < HAIR * raster::STEPS as f64 { TURNED_OF_HAIR } else { TURNED };
+            let (aside, ahead) = turned([vertex, vertex + 1].map(|corner| self.places[corner as usize]));
             let turned = |sign: f32| [0, 1, 2].map(|k| sign * aside * side[k] + ahead * facing[k]);
             self.normals.extend([turned(-1.0), turned(1.0)]);
             let look = (part.colors + ribbon.material.index() as u32) << 1;
@@ -277,24 +275,35 @@ impl<'a> Shot<'a> {
 
     /// Adds a triangle if it may be seen.
     fn face(&mut self, corners: [u32; 3], normals: [u32; 3], look: u32) {
-        let [p, q, r] = corners.map(|corner| self.places[corner as usize]);
-        let outside = |low: i32, high: i32, from: usize, end: usize| {
-            i64::from(high) < from as i64 * raster::STEPS || i64::from(low) > end as i64 * raster::STEPS
-        };
-        let is_behind = p.depth.is_nan() || q.depth.is_nan() || r.depth.is_nan();
-        if is_behind
-            || outside(p.y.min(q.y).min(r.y), p.y.max(q.y).max(r.y), self.rows.start, self.rows.end)
-            || outside(p.x.min(q.x).min(r.x), p.x.max(q.x).max(r.x), 0, self.lens.size[0])
-        {
-            return;
+        let places = corners.map(|corner| self.places[corner as usize]);
+        if may_be_seen(&places, look & 1 == 1, [0..self.lens.size[0], self.rows.clone()]) {
+            self.faces.push(Face { corners, normals, surface: self.surface, look });
         }
-        // A stem is closed: its far side is never seen.
-        let wide = |a: i32, b: i32| i64::from(a) - i64::from(b);
-        if look & 1 == 0 && wide(q.x, p.x) * wide(r.y, p.y) >= wide(q.y, p.y) * wide(r.x, p.x) {
-            return;
-        }
-        self.faces.push(Face { corners, normals, surface: self.surface, look });
     }
+}
+
+/// Whether a triangle is in front of the viewer and in these columns and rows, and not on the far side of a stem.
+pub(super) fn may_be_seen([p, q, r]: &[Place; 3], is_thin: bool, [columns, rows]: [Range<usize>; 2]) -> bool {
+    let outside = |low: i32, high: i32, within: Range<usize>| {
+        i64::from(high) < within.start as i64 * raster::STEPS
+            || i64::from(low) > within.end as i64 * raster::STEPS
+    };
+    let is_behind = p.depth.is_nan() || q.depth.is_nan() || r.depth.is_nan();
+    if is_behind
+        || outside(p.y.min(q.y).min(r.y), p.y.max(q.y).max(r.y), rows)
+        || outside(p.x.min(q.x).min(r.x), p.x.max(q.x).max(r.x), columns)
+    {
+        return false;
+    }
+    // A stem is closed: its far side is never seen.
+    let wide = |a: i32, b: i32| i64::from(a) - i64::from(b);
+    is_thin || wide(q.x, p.x) * wide(r.y, p.y) < wide(q.y, p.y) * wide(r.x, p.x)
+}
+
+/// How far the edges of a ribbon are turned away, given its corners at one end.
+pub(super) fn turned([p, q]: [Place; 2]) -> (f32, f32) {
+    let across = f64::from(q.x - p.x).hypot(f64::from(q.y - p.y));
+    if across < HAIR * raster::STEPS as f64 { TURNED_OF_HAIR } else { TURNED }
 }
 
 /// The look of the floor.

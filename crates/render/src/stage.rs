@@ -34,6 +34,8 @@ pub(super) struct Part {
     pub(super) colors: u32,
     /// `None`: all of the draft. Of a scene with many thin stems these only, or, if they are none, its triangles.
     pub(super) stems: Option<Range<usize>>,
+    /// The number of the plant of the scene that it is a part of; `None`: of the scene itself.
+    pub(super) plant: Option<u32>,
 }
 
 /// What a picture shows.
@@ -110,7 +112,7 @@ impl<'s> Stage<'s> {
             floor: scene.surroundings.floor,
         };
         plan.add_colors(scene);
-        plan.add_plants(scene, None, lens);
+        plan.add_plants(scene, None, None, lens);
         let detail = Detail {
             scale_at: |p: Point| lens.scale_at(p),
             scale_of: None,
@@ -151,7 +153,7 @@ impl<'s> Stage<'s> {
 
 /// The parts of the scene itself. Very many thin stems are several, so that no more of them are made at a time than there is room for.
 fn parts_of(scene: &Draft) -> Vec<Part> {
-    let part = |stems| Part { draft: 0, place: None, colors: 0, stems };
+    let part = |stems| Part { draft: 0, place: None, colors: 0, stems, plant: None };
     let count = scene.thin();
     if count <= STEMS {
         return vec![part(None)];
@@ -183,9 +185,10 @@ impl<'s> Wanted<'s> {
 }
 
 impl<'s> Plan<'s> {
-    /// Adds the plants of a scene in its place.
-    fn add_plants(&mut self, scene: &'s Scene, place: Option<&Placement>, lens: &Lens) {
-        for plant in &scene.plants {
+    /// Adds the plants of a scene in its place, which is in a plant with a number, or is the scene itself.
+    fn add_plants(&mut self, scene: &'s Scene, place: Option<&Placement>, within: Option<u32>, lens: &Lens) {
+        for (number, plant) in (0..).zip(&scene.plants) {
+            let number = within.unwrap_or(number);
             let key = (&raw const *plant.scene).addr();
             let known = self.looks.get(&key).copied();
             let look = known.unwrap_or_else(|| self.look(plant));
@@ -215,8 +218,9 @@ impl<'s> Plan<'s> {
                 add(Size::Near(placement), 0.0)
             };
             wanted[draft - 1].uses += 1;
-            self.parts.push(Part { draft, place: Some(placement), colors: look.colors, stems: None });
-            self.add_plants(scene, Some(&placement), lens);
+            let (place, plant) = (Some(placement), Some(number));
+            self.parts.push(Part { draft, place, colors: look.colors, stems: None, plant });
+            self.add_plants(scene, Some(&placement), Some(number), lens);
         }
     }
 
@@ -303,7 +307,7 @@ mod tests {
         for (threads, most) in [(1, 20_000), (3, 5_000), (2, 1)] {
             assert_eq!(parts, shot::draw_within(most, &raster::FOUR, threads, &stage, &lens, &lighting));
         }
-        stage.parts = vec![Part { draft: 0, place: None, colors: 0, stems: None }];
+        stage.parts = vec![Part { draft: 0, place: None, colors: 0, stems: None, plant: None }];
         assert_eq!(parts, draw(1, &stage));
     }
 }

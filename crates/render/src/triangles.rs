@@ -318,6 +318,7 @@ impl<'s> Solid<'s> {
 }
 
 /// A triangle: vertex and normal at each corner, by number.
+#[derive(Clone, Copy)]
 pub(super) struct Triangle {
     pub(super) owner: OwnerId,
     pub(super) material: MaterialId,
@@ -366,20 +367,74 @@ impl Faces for Triangles {
 }
 
 impl Triangles {
-    /// Everything in a solid, in string order; stems, by number, only if they are to be `kept`.
-    pub(super) fn of(solid: &Solid, kept: impl Fn(usize) -> bool) -> Triangles {
-        let [vertices, normals] = solid.counts.map(|count| count as usize);
-        let mut mesh = Triangles {
+    /// None, with room for so many vertices, normals and triangles.
+    pub(super) fn with_capacity(vertices: usize, normals: usize, faces: usize) -> Triangles {
+        Triangles {
             vertices: Vec::with_capacity(vertices),
             normals: Vec::with_capacity(normals),
             places: Vec::new(),
-            faces: Vec::with_capacity(2 * vertices),
+            faces: Vec::with_capacity(faces),
             segments: vec![None],
             owner: OwnerId::default(),
             material: MaterialId::STEM,
             surface: 0,
             is_thin: false,
+        }
+    }
+
+    /// Adds all triangles of another mesh, none of which is a part of a stem.
+    pub(super) fn append(&mut self, other: &Triangles) {
+        let [vertex, normal] = [self.vertices.len(), self.normals.len()].map(|count| count as u32);
+        if !(self.places.is_empty() && other.places.is_empty()) {
+            self.places.resize(self.vertices.len(), [0.0; 2]);
+            self.places.extend_from_slice(&other.places);
+            self.places.resize(self.vertices.len() + other.vertices.len(), [0.0; 2]);
+        }
+        self.vertices.extend_from_slice(&other.vertices);
+        self.normals.extend_from_slice(&other.normals);
+        let first = self.segments.len() as u32;
+        let last = other.faces.iter().map(|face| face.surface).max();
+        self.segments.resize(self.segments.len() + last.map_or(0, |last| last as usize + 1), None);
+        self.faces.extend(other.faces.iter().map(|face| Triangle {
+            corners: face.corners.map(|(v, n)| (vertex + v, normal + n)),
+            surface: first + face.surface,
+            ..*face
+        }));
+        self.surface = self.segments.len() as u32 - 1;
+    }
+
+    /// Keeps some of the triangles, and vertices and normals that these have. Their order stays.
+    pub(super) fn retain(&mut self, is_kept: impl Fn(&Triangle, &[Point]) -> bool) {
+        let Triangles { vertices, normals, places, faces, .. } = self;
+        faces.retain(|face| is_kept(face, vertices));
+        let numbers = |count: usize, of: &dyn Fn(&Triangle) -> [u32; 3]| {
+            let mut numbers = vec![u32::MAX; count];
+            faces.iter().flat_map(of).for_each(|old| numbers[old as usize] = 0);
+            let mut next = 0..;
+            numbers
+                .iter_mut()
+                .filter(|number| **number == 0)
+                .for_each(|number| *number = next.next().unwrap_or(0));
+            numbers
         };
+        let vertex = numbers(vertices.len(), &|face| face.corners.map(|(vertex, _)| vertex));
+        let normal = numbers(normals.len(), &|face| face.corners.map(|(_, normal)| normal));
+        fn kept<T>(all: &mut Vec<T>, numbers: &[u32]) {
+            let mut numbers = numbers.iter();
+            all.retain(|_| numbers.next().is_some_and(|number| *number != u32::MAX));
+        }
+        kept(vertices, &vertex);
+        kept(places, &vertex);
+        kept(normals, &normal);
+        for face in faces {
+            face.corners = face.corners.map(|(v, n)| (vertex[v as usize], normal[n as usize]));
+        }
+    }
+
+    /// Everything in a solid, in string order; stems, by number, only if they are to be `kept`.
+    pub(super) fn of(solid: &Solid, kept: impl Fn(usize) -> bool) -> Triangles {
+        let [vertices, normals] = solid.counts.map(|count| count as usize);
+        let mut mesh = Triangles::with_capacity(vertices, normals, 2 * vertices);
         solid.points(0..solid.len(), &mut mesh);
         if solid.has_places {
             mesh.places.resize(mesh.vertices.len(), [0.0; 2]);

@@ -114,7 +114,7 @@ pub struct RenderArgs {
     pub accuracy: Option<f64>,
     /// Largest error, in pixels, of plants of other models that move in the wind by the modes of their class (0 to 100; 0: all are solved)
     ///
-    /// For --format png, in scenes with a camera. The error is measured on a sample; without a camera, all plants are solved. Plants of nearly the same age share a drawing where
+    /// For --format png, and half of it for svg, in scenes with a camera. The error is measured on a sample; without a camera, all plants are solved. Plants of nearly the same age share a drawing where
     /// that moves no point by more than this.
     #[arg(long, value_name = "PIXELS", allow_negative_numbers = true, default_value = "0.5", value_parser = bend_pixels)]
     pub bend_pixels: f64,

@@ -211,10 +211,16 @@ pub fn fit(args: &RenderArgs, survey: &Survey, picture: impl Fn(&Fit) -> Picture
     })
 }
 
-/// The size in which the plants of a scene are seen, if pictures of dots are taken by its camera.
+/// The size in which the plants of a scene are seen, if pictures are taken by its camera.
 pub fn detail(args: &RenderArgs, format: Format) -> Option<Detail> {
     let has_view = args.view.is_some() || args.perspective.is_some();
-    if format.content() != Content::Pixels || has_view || args.bend_pixels == 0.0 {
+    let bound = match format.content() {
+        Content::Pixels => args.bend_pixels,
+        // They are looked at enlarged.
+        Content::Vectors => args.bend_pixels / 2.0,
+        Content::Mesh => 0.0,
+    };
+    if has_view || bound == 0.0 {
         return None;
     }
     let size = match (args.size, args.width) {
@@ -230,7 +236,7 @@ pub fn detail(args: &RenderArgs, format: Format) -> Option<Detail> {
         Size::Larger(pixels) | Size::Width(pixels) => (f64::from(pixels) / CAMERA_SHAPE, CAMERA_SHAPE),
     };
     let pixels = smaller * args.zoom.unwrap_or(1.0);
-    Some(Detail { pixels, shape, viewpoint: args.camera, bound: args.bend_pixels })
+    Some(Detail { pixels, shape, viewpoint: args.camera, bound })
 }
 
 /// The page for a picture.

@@ -7,11 +7,17 @@ use super::{OwnerId, Patch, Placement, Polygon, Scene, Segment, Surface, Width};
 impl Scene {
     /// The scene with the elements of its plants among its own, plants in plants included: for formats that know nothing of plants.
     pub fn flattened(&self) -> Cow<'_, Scene> {
+        self.flattened_with(|_| true)
+    }
+
+    /// The same with those of its plants, by number, that are to be `kept`; the others are left out.
+    pub fn flattened_with(&self, kept: impl Fn(usize) -> bool) -> Cow<'_, Scene> {
         if self.plants.is_empty() {
             return Cow::Borrowed(self);
         }
         let mut flat = self.clone();
-        for plant in std::mem::take(&mut flat.plants) {
+        let plants = std::mem::take(&mut flat.plants).into_iter().enumerate();
+        for (_, plant) in plants.filter(|(number, _)| kept(*number)) {
             flat.add_plant(&plant.scene, &plant.placement, plant.owner);
         }
         Cow::Owned(flat)

@@ -43,7 +43,8 @@ pub struct Description {
 /// One frame to be written.
 #[derive(Clone, Copy)]
 pub struct Drawing<'a> {
-    /// The scene. Except for formats of pixels its surfaces are meshes of the accuracy that the format needs, and there are no patches.
+    /// The scene. Where all of it is drawn, and not what is seen of it, there are no plants in it, its surfaces are meshes of the accuracy that the format needs,
+    /// and there are no patches.
     pub scene: &'a Scene,
     /// The scene as it is, with its plants and curved surfaces: for the shadows that it casts.
     pub whole: &'a Scene,

@@ -7,9 +7,10 @@ use svg::Document;
 use svg::node::Blob;
 use svg::node::element::{Definitions, Group, LinearGradient, Rectangle, Stop, Title};
 
+use crate::field::Field;
 use crate::painter::{self, Style, text};
 use crate::sky::Sky;
-use crate::{Fit, Page, floor};
+use crate::{Fit, Page, floor, trace};
 
 /// Scalable Vector Graphics.
 pub(crate) struct Svg;
@@ -28,10 +29,18 @@ impl Exporter for Svg {
         // A page of another shape than what is drawn shows more, such as a floor.
         fit.picture = page.picture;
         let sky = Sky::of(scene, &fit, &page);
-        let (scene, floor) = floor::added(scene, &fit, Some(&page));
         let (casting, memory) = (Some(whole), Some(&*writer.memory));
-        let style = Style { floor, casting, threads: writer.threads, memory, ..style(&fit, &page) };
-        let elements = painter::elements(&scene, style, true, "");
+        let style = Style { casting, threads: writer.threads, memory, ..style(&fit, &page) };
+        let elements = if fit.has_visible_regions() {
+            let field = Field::of(scene, &fit, &page);
+            let beside = field.small(writer.threads)?;
+            let large = field.large();
+            let (scene, floor) = floor::added(&large, &fit, Some(&page));
+            trace::elements(&scene, beside, Style { floor, ..style }, true, "")
+        } else {
+            let (scene, floor) = floor::added(scene, &fit, Some(&page));
+            painter::elements(&scene, Style { floor, ..style }, true, "")
+        };
         let parts = around(&page, title, sky.as_ref(), elements);
         parts.iter().try_for_each(|part| out.write_all(part.as_bytes()))
     }

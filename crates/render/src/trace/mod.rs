@@ -55,10 +55,10 @@ use stems::Plan;
 use tones::Tones;
 
 /// Cells for each pixel of the page, along a side.
-const CELLS_PER_PIXEL: f64 = 2.0;
+pub(super) const CELLS_PER_PIXEL: f64 = 2.0;
 /// Least and most cells on the larger side of a picture.
 const LEAST_CELLS: f64 = 1000.0;
-const MOST_CELLS: f64 = 4000.0;
+pub(super) const MOST_CELLS: f64 = 4000.0;
 /// Greatest distance of tubes from round ones, in cells; most sides of one; and about how many triangles all of them may have.
 const ROUNDNESS: f64 = 0.2;
 const MOST_SIDES: usize = 64;
@@ -72,9 +72,16 @@ const SHORTEST_GRADIENT: f64 = 1.0;
 /// Stems thinner than this many pixels of the page hide nothing: between the middles of cells they would have gaps.
 const LEAST_PIXELS: f64 = 1.5;
 
-/// The elements of a scene in depth, one a line. See [`painter::elements`](super::painter::elements).
-pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -> String {
-    let plan = Plan::of(scene, style);
+/// The elements of a scene in depth, one a line, and of triangles `beside` it, which are parts of its modules. See
+/// [`painter::elements`](super::painter::elements).
+pub(super) fn elements(
+    scene: &Scene,
+    beside: Option<Triangles>,
+    style: Style,
+    named: bool,
+    prefix: &str,
+) -> String {
+    let plan = if beside.is_none() { Plan::of(scene, style) } else { None };
     if let Some(plan) = plan.as_ref().filter(|plan| !plan.has_regions()) {
         let mut page = PageWriter::new(scene, style, named);
         let mut strokes = Strokes::new(scene, style, prefix, |_, _| true);
@@ -96,7 +103,9 @@ pub(super) fn elements(scene: &Scene, style: Style, named: bool, prefix: &str) -
         None => pixels_across(&scene.segments[i], style) >= LEAST_PIXELS,
     };
     let is_near = |i: usize| plan.as_ref().is_none_or(|plan| plan.is_near[i]);
-    let mesh = mesh(scene, style.fit, 1.0 / finest, is_near, has_triangles);
+    let mut mesh = mesh(scene, style.fit, 1.0 / finest, is_near, has_triangles);
+    beside.iter().for_each(|beside| mesh.append(beside));
+    drop(beside);
     let is_fine = mesh.faces.len() > PLAIN;
     let cell = if is_fine { finest } else { cell_of(1.0) };
     // Cells in a pixel of the page.
