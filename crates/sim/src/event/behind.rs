@@ -109,6 +109,11 @@ impl<'m> EventStage<'_, 'm> {
             }
             delay *= 2.0;
         }
+        // It only touches: nothing follows from signs that it does not get.
+        let later = self.signs_later(id, rule, touched, longest);
+        for (place, change) in touched.iter_mut().enumerate().filter(|(place, _)| question.jumps[*place]) {
+            (change.at, change.after) = (now[place], later[place]);
+        }
         When::Now
     }
 

@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 use super::SHORT_LIFE;
 use super::opening::open;
 use super::{EventStage, Firing};
-use crate::detect::signs::NEAR;
+use crate::detect::signs::{NEAR, opposite};
 use crate::error::Error;
 use crate::world::state::{Open, Signs, Switches};
 use dlsys_expr::Dual;
@@ -379,6 +379,16 @@ impl EventStage<'_, '_> {
                     }
                     sign => sign,
                 },
+                // It turns back at a kink (`abs(x)` at 0), and the numbers of now are a rounding before it: a little later tells.
+                (sign @ (Sign::Plus | Sign::Minus), guess) if guess == opposite(sign) => {
+                    probed = true;
+                    self.flow().moving_variables(id, 1e-9 * reach.min(1e12), &mut moving);
+                    rule.sides.eval(&moving, &mut scratch, &mut out);
+                    let [later_a, later_b] = [out[2 * atom], out[2 * atom + 1]];
+                    let turns = Sign::of(later_a.value - later_b.value) == guess
+                        && clear(later_a.rate - later_b.rate, 1e-9) == guess;
+                    if turns { guess } else { sign }
+                }
                 (sign, _) => sign,
             };
             if std::mem::take(&mut probed) {
