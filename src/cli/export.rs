@@ -381,6 +381,7 @@ fn failure(run: &ModelRun, error: &interchange::Error) -> Failure {
             "without `--topology varying` shapes are shared by modules, and the file is much smaller",
         ],
         Error::TooLong { .. } => &[&a_minute],
+        Error::TooWide { .. } => &["a shorter unit, `units length 1e-30`, or an earlier end, `--to T`"],
         _ => &[],
     };
     let help: String = help.iter().map(|line| format!("\n  = help: {line}")).collect();

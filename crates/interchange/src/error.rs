@@ -56,6 +56,14 @@ pub enum Error {
         /// The longest that it may be.
         limit: f64,
     },
+    /// Places in the file are 32 bit floats, beyond which the drawing reaches.
+    #[error("the drawing is {metres:e} m large, and places in the file go up to {limit:e} m")]
+    TooWide {
+        /// Its size in metres.
+        metres: f64,
+        /// The largest that it may be.
+        limit: f64,
+    },
     /// The caller stopped the work.
     #[error("stopped before t = {time}")]
     Stopped {

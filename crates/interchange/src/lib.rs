@@ -144,6 +144,9 @@ impl Options {
     /// The longest animation in seconds: up to there the instants that a file can name are half a millisecond apart at most.
     pub const LONGEST: f64 = 8192.0;
 
+    /// The largest extent in metres: what is as far away has places, and sums of them, that are 32 bit floats.
+    pub const WIDEST: f64 = 1e37;
+
     /// Options with the units of a model, for an animation of this default width and this extent.
     pub fn new(model: &Model, default_width: f64, extent: f64) -> Options {
         let units = model.scenery.units;
@@ -158,6 +161,15 @@ impl Options {
             gases: false,
             threads: 1,
             limits: Limits::default(),
+        }
+    }
+
+    /// Checks that places have 32 bit floats.
+    fn check_extent(&self) -> Result<(), Error> {
+        let metres = self.extent * self.metres;
+        match metres > Options::WIDEST {
+            true => Err(Error::TooWide { metres, limit: Options::WIDEST }),
+            false => Ok(()),
         }
     }
 
@@ -211,6 +223,7 @@ pub fn grow(
     if seconds > Options::LONGEST {
         return Err(Error::TooLong { seconds, limit: Options::LONGEST });
     }
+    options.check_extent()?;
     let settings = Settings { log: true, ..settings };
     let nursery = Nursery::new(model, settings).without_gases().with_ground_in_pieces();
     let mut blank = nursery.blank();

@@ -73,6 +73,7 @@ pub(crate) fn vary<T: Send>(
     work: impl Fn(Varied, &Palette) -> T + Sync,
     mut take: impl FnMut(f64, T) -> Result<(), Error>,
 ) -> Result<(), Error> {
+    options.check_extent()?;
     let nursery = Nursery::new(&session.model, settings);
     let mut blank = nursery.blank();
     blank.notes_poses = true;
