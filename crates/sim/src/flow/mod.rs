@@ -145,16 +145,12 @@ impl FlowStage<'_, '_> {
         let model = self.setup.model;
         let state = self.world.state(id).expect("a module with a rule");
         let rule = &model.rules[state.rule.expect("a module with a rule")];
-        let Some(solve) = state.solve.map(|s| &rule.solves[s]) else {
-            self.set_trajectories(id, false, &[]);
-            return;
-        };
-        if solve.of.is_empty() && solve.algebraic.is_empty() {
-            self.set_trajectories(id, false, &[]);
-            return;
-        }
+        let clause = state.solve.map(|s| &rule.solves[s]);
         let mut trajectories = std::mem::take(&mut self.flows.trajectories);
         trajectories.clear();
+        let Some(solve) = clause.filter(|solve| !solve.of.is_empty() || !solve.algebraic.is_empty()) else {
+            return self.set_trajectories(id, false, trajectories);
+        };
         trajectories.resize(rule.parameters.len(), Trajectory::Rest);
         let mut refused = false;
         if numeric_only {
@@ -162,6 +158,10 @@ impl FlowStage<'_, '_> {
                 trajectories[parameter] = Trajectory::Step(component as u32);
             }
             closed_form::solved(solve, true, &mut trajectories);
+        } else if solve.is_all_numeric() {
+            for (component, &position) in solve.numeric.iter().enumerate() {
+                trajectories[solve.of[position]] = Trajectory::Step(component as u32);
+            }
         } else {
             let read = (rule, solve.stepping.formulas_read());
             self.world.variables_read(read, id, &state.context, self.instant.at, &mut self.scratch.variables);
@@ -171,24 +171,24 @@ impl FlowStage<'_, '_> {
         }
         if refused {
             self.flows.trajectories = trajectories;
-            self.start_trajectories(id, true);
-            return;
+            return self.start_trajectories(id, true);
         }
-        self.set_trajectories(id, numeric_only, &trajectories);
-        self.flows.trajectories = trajectories;
+        self.set_trajectories(id, numeric_only, trajectories);
     }
 
-    fn set_trajectories(&mut self, id: ModuleId, numeric_only: bool, trajectories: &[Trajectory]) {
+    /// Gives a module these trajectories; the list is kept for others.
+    fn set_trajectories(&mut self, id: ModuleId, numeric_only: bool, mut trajectories: Vec<Trajectory>) {
         let now = self.instant.at;
         let state = self.world.state_mut(id).expect("a module with a rule");
         state.since = now;
         state.numeric_only = numeric_only;
         state.trajectories.clear();
-        state.trajectories.extend(trajectories.iter().cloned());
+        state.trajectories.extend(trajectories.drain(..));
         (state.window, state.free_until) = (0.0, f64::NAN);
         if let Some(step) = &mut state.step {
             step.live = false;
         }
+        self.flows.trajectories = trajectories;
     }
 
     /// Finds the next event of a module that is not coupled, from an instant on, and schedules it.

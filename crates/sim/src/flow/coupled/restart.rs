@@ -48,8 +48,11 @@ impl FlowStage<'_, '_> {
             _ => None,
         }));
         let solution = self.world.coupled.take();
-        self.flows.coupled.y.clear();
-        self.flows.coupled.system.clear(at);
+        let Coupled { y, system, .. } = &mut self.flows.coupled;
+        y.clear();
+        system.clear(at);
+        y.reserve_exact(members.len());
+        system.table.places.reserve_exact(members.len());
         let mut count = 0;
         for n in 0..members.len() {
             prefetch(self.world, &members, n);

@@ -66,6 +66,9 @@ impl Linear {
         let mut unknown = vec![NONE; y.len()];
         let mut all = Unknowns { inputs: vec![NONE; table.formulas.len()], ..Unknowns::default() };
         all.problem.tolerance = tolerance;
+        all.problem.y.reserve(y.len());
+        all.problem.b.reserve(y.len());
+        all.problem.entries.reserve(table.sources.len());
         // Unknowns are numbered in string order: the left context of a module before the module.
         for row in &table.rows {
             let rule = &rules[row.rule];
@@ -76,9 +79,10 @@ impl Linear {
             let linear = solve.linear.as_ref()?;
             let sources = &table.sources[row.first_source..row.first_source + row.sources];
             let before = rule.parameters.len() + rule.left.iter().map(|p| p.width).sum::<usize>();
+            let is_formula = |source: &VariableSource| matches!(source, VariableSource::Formula(_));
             let read = |v: usize| linear.variables.iter().flatten().any(|r| *r == v);
             for (v, source) in sources.iter().enumerate().take(before) {
-                if read(v) {
+                if is_formula(source) && read(v) {
                     all.number(source, &table.formulas)?;
                 }
             }
@@ -88,18 +92,24 @@ impl Linear {
                 all.problem.b.push(0.0);
             }
             for (v, source) in sources.iter().enumerate().skip(before) {
-                if read(v) {
+                if is_formula(source) && read(v) {
                     all.number(source, &table.formulas)?;
                 }
             }
         }
         let Unknowns { mut problem, inputs } = all;
         let (mut variables, mut scratch, mut out): (Vec<f64>, Scratch<f64>, Vec<f64>) = Default::default();
+        // The clause whose coefficients `out` has, if they are the same for all its modules.
+        let mut known = None;
         for row in &table.rows {
             let linear = rules[row.rule].solves[row.solve].linear.as_ref()?;
-            table.variables(rules, row, 0.0, y, &[], &mut variables);
-            out.resize(linear.coefficients.outputs(), 0.0);
-            linear.coefficients.eval(&variables, &mut scratch, &mut out);
+            let clause = (row.rule, row.solve);
+            if known != Some(clause) {
+                table.variables(rules, row, 0.0, y, &[], &mut variables);
+                out.resize(linear.coefficients.outputs(), 0.0);
+                linear.coefficients.eval(&variables, &mut scratch, &mut out);
+                known = linear.coefficients.reads().is_empty().then_some(clause);
+            }
             let mut next = out.iter();
             for (i, reads) in linear.variables.iter().enumerate() {
                 let n = unknown[row.first_rate + i];
