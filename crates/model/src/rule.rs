@@ -165,6 +165,13 @@ pub struct Solve {
     pub stepping: Stepping,
 }
 
+impl Solve {
+    /// True if every parameter of the clause has a rate that is integrated numerically.
+    pub fn is_all_numeric(&self) -> bool {
+        self.numeric.len() == self.of.len() && self.algebraic.is_empty()
+    }
+}
+
 /// The terms of the equations of a clause that may have pulses: that are large for a time that may fall between two stages of a step. Terms that
 /// are polynomials in what a step resolves have none.
 #[derive(Clone, Debug, Default)]

@@ -83,12 +83,17 @@ impl Dense {
     }
 
     /// One component at a position, by de Casteljau's algorithm.
+    #[inline]
     pub fn value(&self, component: usize, position: f64) -> f64 {
-        let c = self.of(component);
-        // The most common degrees have code without loops.
-        if let Ok(c) = c.try_into() {
-            return casteljau::<5>(c, position);
+        // The most common degree has code without loops, in the place of the call.
+        match self.of(component).try_into() {
+            Ok(c) => casteljau::<5>(c, position),
+            Err(_) => self.value_of_any_degree(component, position),
         }
+    }
+
+    fn value_of_any_degree(&self, component: usize, position: f64) -> f64 {
+        let c = self.of(component);
         if let Ok(c) = c.try_into() {
             return casteljau::<8>(c, position);
         }

@@ -367,6 +367,9 @@ impl Tree {
         family: Family,
         made: &mut Vec<ModuleId>,
     ) {
+        self.nodes.reserve(kinds.len());
+        self.values.reserve(arguments.len());
+        made.reserve(kinds.len());
         let mut last = Link::end_of(TRUNK);
         let mut next = Link(self.nodes[TRUNK as usize].first);
         while next.ended().is_none() {

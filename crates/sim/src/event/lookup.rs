@@ -167,14 +167,10 @@ impl EventStage<'_, '_> {
     /// The same with new values of some parameters.
     pub fn take_up_with(&mut self, id: ModuleId, rule: usize, context: &Context, given: &[(usize, f64)]) {
         let compiled = &self.setup.model.rules[rule];
-        let error = self.flows.error_of(self.world, id);
+        let is_new = self.world.state(id).is_none();
+        let error = if is_new { 0.0 } else { self.flows.error_of(self.world, id) };
         self.world.rebase_with(id, self.instant.at, given);
-        let now = self.instant.at;
-        if let Some(state) = self.world.state_mut(id) {
-            state.pass_changes(now);
-        }
-        let followed =
-            self.world.state(id).filter(|s| s.rule == Some(rule)).map(|s| Signs::from_slice(&s.signs));
+        let followed = if is_new { None } else { self.signs_followed(id, rule) };
         let followed = followed.map(|signs| (signs, error));
         let (mut signs, clear) = self.signs_of_values(id, compiled, context, followed);
         let before = self.world.state(id);
@@ -189,7 +185,7 @@ impl EventStage<'_, '_> {
             }
         }
         let was_open = before.is_some_and(|s| s.open.is_some());
-        if before.is_none() {
+        if is_new {
             self.world.new_state(id);
         }
         let state = self.world.state_mut(id).expect("just made");
@@ -214,6 +210,14 @@ impl EventStage<'_, '_> {
         if !was_open {
             self.events.opened.push(id);
         }
+    }
+
+    /// The signs up to now that a module was followed with, if it was under this rule.
+    fn signs_followed(&mut self, id: ModuleId, rule: usize) -> Option<Signs> {
+        let now = self.instant.at;
+        let state = self.world.state_mut(id)?;
+        state.pass_changes(now);
+        (state.rule == Some(rule)).then(|| Signs::from_slice(&state.signs))
     }
 
     /// The modules whose rules have contexts, in string order.

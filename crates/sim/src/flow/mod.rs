@@ -145,12 +145,17 @@ impl FlowStage<'_, '_> {
         let model = self.setup.model;
         let state = self.world.state(id).expect("a module with a rule");
         let rule = &model.rules[state.rule.expect("a module with a rule")];
-        let Some(solve) = state.solve.map(|s| &rule.solves[s]) else {
-            self.set_trajectories(id, false, &[]);
+        let clause = state.solve.map(|s| &rule.solves[s]);
+        let Some(solve) = clause.filter(|solve| !solve.of.is_empty() || !solve.algebraic.is_empty()) else {
+            self.begin_anew(id, false);
             return;
         };
-        if solve.of.is_empty() && solve.algebraic.is_empty() {
-            self.set_trajectories(id, false, &[]);
+        if !numeric_only && solve.is_all_numeric() {
+            let trajectories = self.begin_anew(id, false);
+            (0..rule.parameters.len()).for_each(|_| trajectories.push(Trajectory::Rest));
+            for (component, &position) in solve.numeric.iter().enumerate() {
+                trajectories[solve.of[position]] = Trajectory::Step(component as u32);
+            }
             return;
         }
         let mut trajectories = std::mem::take(&mut self.flows.trajectories);
@@ -169,26 +174,27 @@ impl FlowStage<'_, '_> {
             refused = !closed_form::formulas(solve, rule.time_variable(), self.scratch, &mut trajectories)
                 || !closed_form::functions(solve, rule.time_variable(), self.scratch, &mut trajectories);
         }
-        if refused {
-            self.flows.trajectories = trajectories;
-            self.start_trajectories(id, true);
-            return;
+        if !refused {
+            self.begin_anew(id, numeric_only).extend(trajectories.drain(..));
         }
-        self.set_trajectories(id, numeric_only, &trajectories);
         self.flows.trajectories = trajectories;
+        if refused {
+            self.start_trajectories(id, true);
+        }
     }
 
-    fn set_trajectories(&mut self, id: ModuleId, numeric_only: bool, trajectories: &[Trajectory]) {
+    /// Ends the trajectories of a module; those from the present on are to be put into the list, which is empty.
+    fn begin_anew(&mut self, id: ModuleId, numeric_only: bool) -> &mut SmallVec<[Trajectory; 2]> {
         let now = self.instant.at;
         let state = self.world.state_mut(id).expect("a module with a rule");
         state.since = now;
         state.numeric_only = numeric_only;
-        state.trajectories.clear();
-        state.trajectories.extend(trajectories.iter().cloned());
         (state.window, state.free_until) = (0.0, f64::NAN);
         if let Some(step) = &mut state.step {
             step.live = false;
         }
+        state.trajectories.clear();
+        &mut state.trajectories
     }
 
     /// Finds the next event of a module that is not coupled, from an instant on, and schedules it.

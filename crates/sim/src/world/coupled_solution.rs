@@ -65,6 +65,7 @@ impl CoupledSolution {
         self.tracks.is_empty()
     }
 
+    #[inline]
     fn track(&self, component: usize) -> Track {
         let whole = Track { first: 0, count: 1, component: component as u32 };
         self.tracks.get(component).copied().unwrap_or(whole)
@@ -72,6 +73,7 @@ impl CoupledSolution {
 
     /// The dense output that a component follows from an instant on, and its number there; None for one that has not been
     /// integrated yet.
+    #[inline]
     pub fn stretch(&self, component: usize, at: SimTime) -> Option<(&Dense, usize)> {
         let Track { first, count, component } = self.track(component);
         if count == 1 {
@@ -152,6 +154,7 @@ impl CoupledSolution {
 #[inline]
 pub fn value_of(dense: &Dense, component: usize, position: f64) -> f64 {
     match dense.of(component) {
+        [only] => *only,
         [.., last] if position == 1.0 => *last,
         _ => dense.value(component, position),
     }

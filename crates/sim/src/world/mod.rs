@@ -90,8 +90,8 @@ impl World {
     /// The memory for a module's state; it may be that of another, dead one.
     pub fn make_state(&mut self, id: ModuleId) -> &mut State {
         let slot = id.slot();
-        if self.states.len() <= slot {
-            self.states.resize(slot + 1, None);
+        while self.states.len() <= slot {
+            self.states.push(None);
         }
         self.states[slot].get_or_insert_with(|| Box::new(State::new(id)))
     }

@@ -151,6 +151,11 @@ impl Neighbours {
     /// The left neighbour, as [`Tree::left`] finds it.
     pub fn left(&mut self, tree: &Tree, id: ModuleId, skipped: impl Fn(KindId) -> bool) -> Option<ModuleId> {
         let known = self.near(id).link(LEFT);
+        if let Link::Module(found) = known
+            && tree.is_alive(found)
+        {
+            return Some(found);
+        }
         let left = self.forwarded(tree, known);
         if left != known {
             self.near(id).set(LEFT, left);
@@ -276,6 +281,10 @@ impl Neighbours {
         made: &[ModuleId],
         skipped: impl Fn(KindId) -> bool,
     ) {
+        if let Some(last) = made.last() {
+            // Room for all of them at once.
+            self.slot(*last);
+        }
         let (left, right) = match dead {
             Some(id) => {
                 let near = self.near(id);

@@ -90,8 +90,13 @@ impl FlowStage<'_, '_> {
         let mut near = std::mem::take(&mut self.flows.coupled.loosened);
         // Modules with many neighbours, whose neighbours have been added already.
         let mut known = HashSet::new();
+        let is_first = self.instant.number == 1;
         for &id in begun {
             near.push(id);
+            if is_first {
+                // All modules begin now, the neighbours among them.
+                continue;
+            }
             self.neighbours.readers(self.world, self.setup.model, id, |reader, context| {
                 near.push(reader);
                 if context.len() < 8 || known.insert(reader) {
@@ -113,18 +118,19 @@ impl FlowStage<'_, '_> {
             let Some(state) = self.world.state(id) else { continue };
             let coupled = self.is_coupled(id);
             let reads = state.rule.is_some_and(|r| self.setup.model.rules[r].reads_context);
+            let has_moved = state.restarted == self.instant.number;
             let new_input =
-                reads && (state.exchanged == self.instant.number || state.context.iter().any(moved));
+                || reads && (state.exchanged == self.instant.number || state.context.iter().any(moved));
             if coupled {
                 if !state.coupled {
                     affected.joined.push(id);
                 }
-                if !state.coupled || moved(&id) || new_input {
+                if !state.coupled || has_moved || new_input() {
                     affected.seeds.push(id);
                 }
             } else if state.coupled {
                 affected.freed.push(id);
-            } else if new_input && !moved(&id) {
+            } else if !has_moved && new_input() {
                 affected.dependent.push(id);
             }
         }

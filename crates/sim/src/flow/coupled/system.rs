@@ -60,6 +60,7 @@ impl System {
     pub fn rebuild(&mut self, rules: &[Rule], modules: &Membership, unknown: impl Fn(u32) -> Option<u32>) {
         self.table.clear(modules.start);
         self.is_bare = false;
+        self.table.rows.reserve_exact(modules.members.len());
         for (at, &id) in modules.members.iter().enumerate() {
             // The modules of a region have just been visited.
             if modules.members.len() > REGION {

@@ -12,6 +12,7 @@
 //! fine one, are kept, so that repeated evaluations do not begin at the start each time.
 
 use super::{Problem, ROUNDING};
+use dlsys_wide::Kernel;
 
 /// Lengths of the stretches, in units of the mean time between two events of the fastest unknown.
 const STRETCHES: [f64; 2] = [256.0, 64.0];
@@ -332,15 +333,41 @@ impl Series {
 
     /// `out = c ((A + q) x + b constant)`, which is added to the sum.
     fn multiply(&self, x: &[f64], c: f64, constant: f64, out: &mut [f64], sum: &mut [f64]) {
+        dlsys_wide::run(Product { series: self, x, c, constant, out: &mut *out, sum: &mut *sum });
+        for &(row, column, a) in &self.others {
+            let more = c * a * x[column as usize];
+            out[row as usize] += more;
+            sum[row as usize] += more;
+        }
+    }
+}
+
+/// The part of a product that stands along bands, for all rows side by side.
+struct Product<'p> {
+    series: &'p Series,
+    x: &'p [f64],
+    c: f64,
+    constant: f64,
+    out: &'p mut [f64],
+    sum: &'p mut [f64],
+}
+
+impl Kernel for Product<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Product { series, x, c, constant, out, sum } = self;
+        let Series { diagonal, bands, b, .. } = series;
         let n = x.len();
         let mut first = 0;
         while first < n {
             let end = (first + TILE).min(n);
             let tile = &mut out[first..end];
-            for ((out, d), x) in tile.iter_mut().zip(&self.diagonal[first..end]).zip(&x[first..end]) {
+            for ((out, d), x) in tile.iter_mut().zip(&diagonal[first..end]).zip(&x[first..end]) {
                 *out = d * x;
             }
-            for (offset, band) in &self.bands {
+            for (offset, band) in bands {
                 // The rows of the tile whose columns exist.
                 let from = first.max((-*offset).max(0) as usize);
                 let to = end.min(n - (*offset).max(0) as usize);
@@ -353,7 +380,7 @@ impl Series {
                 }
             }
             let tile = out[first..end].iter_mut().zip(&mut sum[first..end]);
-            match self.b.get(first..end) {
+            match b.get(first..end) {
                 Some(b) => {
                     for ((out, sum), b) in tile.zip(b) {
                         *out = c * (*out + constant * b);
@@ -368,11 +395,6 @@ impl Series {
                 }
             }
             first = end;
-        }
-        for &(row, column, a) in &self.others {
-            let more = c * a * x[column as usize];
-            out[row as usize] += more;
-            sum[row as usize] += more;
         }
     }
 }
