@@ -154,6 +154,7 @@ impl CoupledSolution {
 #[inline]
 pub fn value_of(dense: &Dense, component: usize, position: f64) -> f64 {
     match dense.of(component) {
+        [only] => *only,
         [.., last] if position == 1.0 => *last,
         _ => dense.value(component, position),
     }

@@ -108,12 +108,17 @@ impl FlowStage<'_, '_> {
             && !self.searches_coupled();
         let is_explicit = !self.setup.settings.method.is_implicit() && !self.flows.coupled.control.stiff;
         let is_linear = without_steps && self.flows.coupled.members.iter().all(|id| self.is_linear(*id));
-        self.write_equations(at, is_linear || !is_explicit);
+        let (rules, tolerance) = (&self.setup.model.rules, self.setup.coupled_settings.tolerance);
+        let Coupled { members, y, .. } = &self.flows.coupled;
+        let modules = Membership { world: self.world, members, start: at, frozen: false };
+        let mut without = if is_linear { Linear::of_plain(rules, &modules, y, tolerance) } else { None };
+        if without.is_none() {
+            self.write_equations(at, is_linear || !is_explicit);
+            let Coupled { system, y, .. } = &self.flows.coupled;
+            without = is_linear.then(|| Linear::new(system, rules, y, tolerance)).flatten();
+        }
         let Coupled { system, y, integrator, linear, tried, pulsing, .. } = &mut self.flows.coupled;
-        let rules = &self.setup.model.rules;
-        *tried = without_steps;
-        *linear =
-            is_linear.then(|| Linear::new(system, rules, y, self.setup.coupled_settings.tolerance)).flatten();
+        (*tried, *linear) = (without_steps, without);
         // After each step all members are searched.
         let is_unwatched =
             rules.iter().all(|rule| rule.atoms.is_empty()) && pulsing.is_empty() && system.algebra.is_empty();

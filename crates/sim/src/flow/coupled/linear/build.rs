@@ -2,8 +2,9 @@
 
 use super::{Linear, Problem};
 use crate::flow::coupled::rows::{FormulaInput, VariableSource};
-use crate::flow::coupled::system::System;
+use crate::flow::coupled::system::{Membership, System};
 use crate::trajectory::{Chain, Trajectory};
+use crate::world::prefetch::prefetch;
 use dlsys_expr::Scratch;
 use dlsys_model::Rule;
 use smallvec::smallvec;
@@ -55,6 +56,61 @@ impl Unknowns {
 }
 
 impl Linear {
+    /// The same as [`Linear::new`] without a table of equations, where modules read nothing but one another and what rests, and their
+    /// coefficients are those of their clause. None where that is not so.
+    pub fn of_plain(rules: &[Rule], modules: &Membership, y: &[f64], tolerance: f64) -> Option<Linear> {
+        let world = modules.world;
+        let mut problem = Problem { entries: Vec::new(), b: vec![0.0; y.len()], y: y.to_vec(), tolerance };
+        let (mut known, mut out) = (None, Vec::new());
+        for (at, &id) in modules.members.iter().enumerate() {
+            prefetch(world, modules.members, at);
+            let state = world.state(id)?;
+            let Some((rule, solve)) = state.rule.zip(state.solve) else { continue };
+            let clause = &rules[rule].solves[solve];
+            let linear = clause.linear.as_ref()?;
+            if known != Some((rule, solve)) {
+                let is_plain = rules[rule].aggregates.is_empty() && clause.algebraic.is_empty();
+                if !is_plain || !linear.coefficients.reads().is_empty() {
+                    return None;
+                }
+                out.resize(linear.coefficients.outputs(), 0.0);
+                // None of them is read.
+                let variables = vec![0.0; rules[rule].variables + clause.switches.len()];
+                linear.coefficients.eval(&variables, &mut Vec::new(), &mut out);
+                known = Some((rule, solve));
+                let left = modules.members.len() - at;
+                problem.entries.reserve(left * linear.variables.iter().map(Vec::len).sum::<usize>());
+            }
+            if state.numeric_only {
+                return None;
+            }
+            let mut next = out.iter();
+            for (reads, &position) in linear.variables.iter().zip(&clause.numeric) {
+                let Trajectory::Coupled(n) = *state.trajectories.get(clause.of[position])? else {
+                    return None;
+                };
+                problem.b[n as usize] += next.next()?;
+                for &variable in reads {
+                    let coefficient = *next.next()?;
+                    let read = clause.stepping.reads(false).iter().find(|read| read.variable == variable)?;
+                    let (module, moves) = match read.neighbour.map(|n| state.context.context()[n]) {
+                        None => (id, Some(state)),
+                        Some(module) => (module, world.state(module)),
+                    };
+                    match moves.and_then(|state| state.trajectories.get(read.parameter)) {
+                        Some(Trajectory::Coupled(column)) => problem.entries.push((n, *column, coefficient)),
+                        None | Some(Trajectory::Rest | Trajectory::Step(_)) => {
+                            problem.b[n as usize] +=
+                                coefficient * world.tree.parameters(module)[read.parameter];
+                        }
+                        Some(_) => return None,
+                    }
+                }
+            }
+        }
+        Linear::of(problem, (0..y.len() as u32).collect(), modules.start)
+    }
+
     /// The solution of the equations of coupled modules, from the state `y`. None if the equations, or those of a
     /// closed form that they read, are not linear, or no method solves them without steps. `tolerance` is relative to
     /// max(1, |value|).
