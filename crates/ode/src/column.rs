@@ -40,6 +40,21 @@ impl Column {
         self.room[self.first + place]
     }
 
+    /// The first numbers: fewer questions than a part of the slice asks.
+    ///
+    /// # Panics
+    /// If they are more than there is room for.
+    #[inline]
+    pub fn head(&self, count: usize) -> &[f64] {
+        &self.room[self.first..][..count]
+    }
+
+    /// The same, to be changed.
+    #[inline]
+    pub fn head_mut(&mut self, count: usize) -> &mut [f64] {
+        &mut self.room[self.first..][..count]
+    }
+
     /// Room for so many zeros.
     fn with_room(len: usize) -> Column {
         let room = vec![0.0; len + IN_LINE - 1];

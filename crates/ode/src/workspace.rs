@@ -84,14 +84,14 @@ impl Workspace {
             return;
         }
         let n = self.end.len();
-        let [least, greatest] = self.reached.each_mut().map(|values| &mut values[..n]);
+        let [least, greatest] = &mut self.reached;
         if is_first {
-            least.copy_from_slice(&self.from[..n]);
-            greatest.copy_from_slice(&self.from[..n]);
+            least[..n].copy_from_slice(&self.from[..n]);
+            greatest[..n].copy_from_slice(&self.from[..n]);
         }
-        for (component, value) in self.stage[..n].iter().enumerate() {
-            least[component] = least[component].min(*value);
-            greatest[component] = greatest[component].max(*value);
+        for ((least, greatest), value) in least.iter_mut().zip(greatest).zip(self.stage.head(n)) {
+            *least = least.min(*value);
+            *greatest = greatest.max(*value);
         }
     }
 
@@ -99,7 +99,7 @@ impl Workspace {
     pub(crate) fn evaluate(&mut self, system: &mut impl Rates, tau: f64, stage: usize) {
         self.evaluations += system.modules();
         let n = self.end.len();
-        system.rates(tau, &self.stage[..n], &mut self.k[stage][..n]);
+        system.rates(tau, self.stage.head(n), self.k[stage].head_mut(n));
     }
 
     /// Computes the rates at the start of a step.
