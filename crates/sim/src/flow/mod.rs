@@ -152,7 +152,7 @@ impl FlowStage<'_, '_> {
         };
         if !numeric_only && solve.is_all_numeric() {
             let trajectories = self.begin_anew(id, false);
-            trajectories.resize(rule.parameters.len(), Trajectory::Rest);
+            (0..rule.parameters.len()).for_each(|_| trajectories.push(Trajectory::Rest));
             for (component, &position) in solve.numeric.iter().enumerate() {
                 trajectories[solve.of[position]] = Trajectory::Step(component as u32);
             }

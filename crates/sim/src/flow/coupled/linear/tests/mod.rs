@@ -2,6 +2,7 @@
 //! transport in closed form.
 
 mod oracle;
+mod plain;
 
 use super::*;
 use crate::{Settings, Stats};
