@@ -74,7 +74,9 @@ impl Linear {
                     return None;
                 }
                 out.resize(linear.coefficients.outputs(), 0.0);
-                linear.coefficients.eval(&[], &mut Vec::new(), &mut out);
+                // None of them is read.
+                let variables = vec![0.0; rules[rule].variables + clause.switches.len()];
+                linear.coefficients.eval(&variables, &mut Vec::new(), &mut out);
                 known = Some((rule, solve));
                 let left = modules.members.len() - at;
                 problem.entries.reserve(left * linear.variables.iter().map(Vec::len).sum::<usize>());
