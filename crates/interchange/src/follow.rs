@@ -105,24 +105,29 @@ impl Follower<'_, '_> {
             }
             let (chunk, others) = rest.split_at(count);
             rest = others;
-            let knots = self.knots(start, chunk, times)?;
-            for pair in knots.windows(2) {
-                self.tracks.add(&pair[1], Some(pair[0].time), &self.births, tolerance);
+            let to_frame = (chunk[chunk.len() - 1] - start.time) / chunk.len() as f64;
+            // The samples between two frames may be too many by themselves.
+            for part in times.chunks((AT_ONCE / (start.size() + 1)).max(1)) {
+                let knots = self.knots(start, to_frame, part.to_vec())?;
+                for pair in knots.windows(2) {
+                    self.tracks.add(&pair[1], Some(pair[0].time), &self.births, tolerance);
+                }
+                start = knots.into_iter().next_back().unwrap_or_default();
             }
             if self.tracks.size > self.limits.numbers {
                 let time = chunk.last().copied().unwrap_or(first);
                 return Err(Error::TooLarge { time, limit: self.limits.numbers });
             }
-            start = knots.into_iter().next_back().unwrap_or_default();
         }
         progress(start.time);
         self.tracks.finish(tolerance);
         Ok(())
     }
 
-    /// The samples from the last one before some frames up to them.
-    fn knots(&mut self, start: Sample, frames: &[f64], mut times: Vec<f64>) -> Result<Vec<Sample>, Error> {
-        let to_frame = (frames[frames.len() - 1] - start.time) / frames.len() as f64;
+    /// The samples from the last one up to the last of these times, with these and as many more as the motion needs. From frame to frame it
+    /// is `to_frame`.
+    fn knots(&mut self, start: Sample, to_frame: f64, mut times: Vec<f64>) -> Result<Vec<Sample>, Error> {
+        let end = times[times.len() - 1];
         let long = TESTED * to_frame.min(self.closeness.longest);
         let mut knots = BTreeMap::from([(
             key(start.time),
@@ -154,7 +159,7 @@ impl Follower<'_, '_> {
                 break;
             }
         }
-        self.advance(frames[frames.len() - 1])?;
+        self.advance(end)?;
         Ok(knots.into_values().map(|knot| knot.sample).collect())
     }
 

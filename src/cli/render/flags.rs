@@ -72,7 +72,7 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
     let is_file = |name: &str| extension == name;
     if !args.out.is_dir() && OTHERS.contains(&&*extension) {
         return Err(usage(format!(
-            "no format of dlsys writes .{extension}, and -o {} would be a folder; write a .svg, .png, .webp, .gif, .glb, .usda or .obj file",
+            "no format of dlsys writes .{extension}, and -o {} would be a folder; write a .svg, .png, .webp, .gif, .glb or .usda file; OBJ files stand in a folder, --format obj",
             args.out.display()
         )));
     }
