@@ -3,6 +3,7 @@
 use super::{Method, Settings};
 use dlsys_model::{CUT, KindId, Model, Produce, Rule, ZeroCrossing};
 use dlsys_tree::Seed;
+use std::collections::BTreeSet;
 
 /// The facts of a run. Every stage reads them, none writes them.
 #[derive(Clone)]
@@ -28,6 +29,8 @@ pub struct Setup<'m> {
     pub levels_decide: Vec<bool>,
     /// By rule and production: something jumps in its condition or its successors.
     pub jumps: Vec<Vec<bool>>,
+    /// By rule and production: the variables over which something jumps in its successors.
+    pub jump_reads: Vec<Vec<Vec<usize>>>,
     /// By rule: some comparison jumps.
     pub has_jumps: Vec<bool>,
     /// Neighbours are remembered.
@@ -76,6 +79,7 @@ impl<'m> Setup<'m> {
             successors_read_context: successors_read_context.collect(),
             levels_decide: model.rules.iter().map(levels_decide).collect(),
             jumps: model.rules.iter().map(jumps).collect(),
+            jump_reads: model.rules.iter().map(jump_reads).collect(),
             has_jumps: model.rules.iter().map(has_jumps).collect(),
             hands_on,
             gathers,
@@ -121,4 +125,10 @@ fn jumps(rule: &Rule) -> Vec<bool> {
     let makes = |produce: &Produce| produce.outcome.jump_reads().next().is_some();
     let jumps = |produce: &Produce| asks_for_jumps(rule, produce) || asks(produce) || makes(produce);
     rule.produces.iter().map(jumps).collect()
+}
+
+/// By production: the variables over which something jumps in its successors, each once.
+fn jump_reads(rule: &Rule) -> Vec<Vec<usize>> {
+    let reads = |produce: &Produce| -> BTreeSet<usize> { produce.outcome.jump_reads().collect() };
+    rule.produces.iter().map(|produce| reads(produce).into_iter().collect()).collect()
 }

@@ -111,7 +111,7 @@ impl EventStage<'_, '_> {
         let (mut moving, mut registers) = (Vec::new(), Vec::new());
         self.flow().moving_variables(fire.id, 0.0, &mut moving);
         let [mut least, mut most] = [FIRST_DELAY * self.instant.at.resolution(), longest];
-        for variable in rule.produces[fire.produce].outcome.jump_reads() {
+        for &variable in &self.setup.jump_reads[fire.rule][fire.produce] {
             let Some(Dual { value, rate }) = moving.get(variable).filter(|moving| moving.rate != 0.0) else {
                 continue;
             };
