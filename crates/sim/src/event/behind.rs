@@ -20,6 +20,7 @@ const LONGEST_DELAY: f64 = 1e-6;
 const SHORTEST_DELAY: f64 = 1e-18;
 
 /// When the event of a module takes place.
+#[derive(Clone, Copy)]
 pub(super) enum When {
     /// Now.
     Now,
@@ -166,9 +167,7 @@ impl<'m> EventStage<'_, 'm> {
                 variables[variable] = level;
             }
         }
-        let mut sides = vec![0.0; rule.sides.outputs()];
-        rule.sides.eval(&self.scratch.variables, &mut self.scratch.registers, &mut sides);
-        touched.iter().map(|change| Sign::of(sides[2 * change.atom] - sides[2 * change.atom + 1])).collect()
+        signs(rule, touched, &self.scratch.variables, &mut self.scratch.registers)
     }
 
     /// The signs of differences a little later.
@@ -176,9 +175,13 @@ impl<'m> EventStage<'_, 'm> {
         let mut moving: Vec<Dual<f64>> = Vec::new();
         self.flow().moving_variables(id, delay, &mut moving);
         let values: Vec<f64> = moving.iter().map(|variable| variable.value).collect();
-        let rule = &self.setup.model.rules[index];
-        let mut sides = vec![0.0; rule.sides.outputs()];
-        rule.sides.eval(&values, &mut self.scratch.registers, &mut sides);
-        touched.iter().map(|change| Sign::of(sides[2 * change.atom] - sides[2 * change.atom + 1])).collect()
+        signs(&self.setup.model.rules[index], touched, &values, &mut self.scratch.registers)
     }
+}
+
+/// The signs of the differences of touched atoms, by the values of the rule's variables.
+fn signs(rule: &Rule, touched: &[Change], variables: &[f64], registers: &mut Vec<f64>) -> Vec<Sign> {
+    let mut sides = vec![0.0; rule.sides.outputs()];
+    rule.sides.eval(variables, registers, &mut sides);
+    touched.iter().map(|change| Sign::of(sides[2 * change.atom] - sides[2 * change.atom + 1])).collect()
 }

@@ -87,6 +87,14 @@ impl EventStage<'_, '_> {
         }
     }
 
+    /// The same, of a module whose event has been found to take place now.
+    pub(super) fn touch_then(&mut self, id: ModuleId, touched: &[Change], when: When) {
+        self.touch(id, touched);
+        if let (When::Behind, Some(state)) = (when, self.world.state_mut(id)) {
+            open(state).behind = true;
+        }
+    }
+
     /// Notes that a parameter of the modules of a context, counted over all of them, is at a level at this instant: whoever reads it now reads
     /// that, and not a rounding of it.
     fn note_level_of_neighbour(&mut self, id: ModuleId, mut parameter: usize, level: f64) {
@@ -160,10 +168,7 @@ impl EventStage<'_, '_> {
             return Ok(None);
         }
         self.flow().learn(id);
-        self.touch(id, &touched);
-        if let (When::Behind, Some(state)) = (when, self.world.state_mut(id)) {
-            open(state).behind = true;
-        }
+        self.touch_then(id, &touched, when);
         Ok(Some(id))
     }
 

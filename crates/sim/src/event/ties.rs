@@ -32,11 +32,12 @@ impl EventStage<'_, '_> {
             for looker in self.lookers_through_values(id) {
                 if let Some(change) = self.tie(looker, other) {
                     let mut changes = [change];
-                    if let When::Later(_) = self.behind_jumps(looker, &mut changes) {
+                    let when = self.behind_jumps(looker, &mut changes);
+                    if let When::Later(_) = when {
                         continue;
                     }
                     let before = self.events.opened.len();
-                    self.touch(looker, &changes);
+                    self.touch_then(looker, &changes, when);
                     known = if self.events.opened.len() > before && known > before { before } else { known };
                 }
             }
