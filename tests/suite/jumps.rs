@@ -347,3 +347,53 @@ fn whole_parts_of_sums_of_what_moves_are_counted_once() {
     assert_eq!(string[0].1[1..], [8.0, 5.0]);
     assert_eq!(string.len(), 6);
 }
+
+/// Where the time is known from two sides, by a whole part and by a comparison of it, one of which comes a rounding before the other.
+#[test]
+fn comparisons_of_whole_parts_in_rates_are_seen_wherever_the_value_begins() {
+    for (k, whole) in (1..60).flat_map(|k| [(k, 2.0), (k, 0.0), (k, -1.0)]) {
+        let start = whole + f64::from(k) / 64.0 + 0.003;
+        for (condition, sign) in [
+            (format!("floor(y) > {whole}"), 1.0),
+            (format!("floor(y) = {whole} + 1"), 1.0),
+            (format!("ceil(y) <= {whole}"), -1.0),
+            (format!("floor(y) < {whole}"), -1.0),
+        ] {
+            let rate = 0.7 * sign;
+            let level = if sign > 0.0 { whole + 1.0 } else { whole };
+            let met = (level - start) / rate;
+            let t = met + 0.37;
+            let text = format!(
+                "initial string: A(0, {start})\nA(x, y): solve dx/dt = if {condition} then 1 else 2, dy/dt = {rate}"
+            );
+            reaches(&text, t, "A", &[2.0 * met + 0.37, start + rate * t]);
+        }
+    }
+}
+
+/// A remainder: even and odd whole parts.
+#[test]
+fn remainders_of_whole_parts_change_rates_at_each_whole_number() {
+    // y passes 3, 4, …, 8; x grows by 1 a unit of time where the whole part is even, else by 2.
+    let odd = "if floor(y) - 2*floor(y/2) = 0 then 1 else 2";
+    let text = format!(
+        "initial string: A(0, 2.9, 2)\nA(x, y, n):\n  solve dx/dt = {odd}, dy/dt = 1\n  if floor(y) > n produce A(x, y, floor(y))"
+    );
+    reaches(&text, 5.4, "A", &[0.1 + 2.0 + 1.0 + 2.0 + 1.0 + 2.0 + 0.3, 8.3, 8.0]);
+    // Falling, through zero: even from 2 to 0 exclusive of ends that count with the whole number below.
+    let text = format!("initial string: A(0, 1.4)\nA(x, y): solve dx/dt = {odd}, dy/dt = -1");
+    reaches(&text, 4.0, "A", &[2.0 * 0.4 + 1.0 + 2.0 + 1.0 + 2.0 * 0.6, -2.6]);
+}
+
+/// A whole part of what jumps itself is no comparison of what moves.
+#[test]
+fn whole_parts_of_whole_parts_are_counted_at_their_jumps() {
+    let text = "initial string: A(-1.7, -1, 0)\nA(x, n, k):\n  solve dx/dt = 1\n  if floor(0.5*floor(x)) != n produce A(x, floor(0.5*floor(x)), k + 1)";
+    reaches(text, 1.69, "A", &[-0.01, -1.0, 0.0]);
+    reaches(text, 2.31, "A", &[0.61, 0.0, 1.0]);
+    reaches(text, 6.0, "A", &[4.3, 2.0, 3.0]);
+    let text = "initial string: A(-0.5, -2.25, -2, 0)\nA(x, y, n, k):\n  solve dx/dt = -1.25, dy/dt = 1.5\n  if floor(0.5*floor(x + y)) != n produce A(x, y, floor(0.5*floor(x + y)), k + 1)";
+    reaches(text, 3.7, "A", &[-5.125, 3.3, -1.0, 1.0]);
+    let text = "initial string: A(0, 0.3)\nA(x, y): solve dx/dt = if floor(y) - floor(floor(y)/2)*2 < 0.5 then 1 else 3, dy/dt = 1";
+    reaches(text, 2.0, "A", &[0.7 + 3.0 + 0.3, 2.3]);
+}

@@ -25,7 +25,7 @@ pub fn plain(graph: &mut Graph, id: NodeId, is_steady: &dyn Fn(u32) -> bool) -> 
         }
         Binary::Lt | Binary::Le => {
             let is_strict = op == Binary::Lt;
-            phase(graph, a, b, is_strict)
+            phase(graph, a, b, is_strict, is_steady)
                 .or_else(|| below(graph, a, b, is_strict, is_steady))
                 .or_else(|| above(graph, a, b, is_strict, is_steady))
         }
@@ -53,14 +53,35 @@ fn shifted(graph: &mut Graph, sum: NodeId, level: NodeId) -> (NodeId, NodeId) {
     (sum, level)
 }
 
-/// True if an expression moves, so that its whole part jumps, and a level does not, so that its whole part does not.
+/// True if an expression moves without jumps, so that its whole part jumps where it passes whole numbers, and a level does not move, so that its
+/// whole part does not.
 fn jumps(graph: &Graph, x: NodeId, level: NodeId, is_steady: &dyn Fn(u32) -> bool) -> bool {
     let rests = |id| graph.variables(&[id]).into_iter().all(is_steady);
-    rests(level) && !rests(x)
+    rests(level) && !rests(x) && !has_steps(graph, &[x], is_steady)
+}
+
+/// True if expressions jump while variables move: they contain a whole part, a sign, a choice or the like of what is not steady.
+pub fn has_steps(graph: &Graph, roots: &[NodeId], is_steady: &dyn Fn(u32) -> bool) -> bool {
+    let decides = |id: NodeId| match graph.node(id) {
+        Node::Unary(Unary::Floor | Unary::Ceil | Unary::Sign, a) | Node::Element(_, a) => Some([a, a]),
+        Node::Binary(Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne, a, b) => Some([a, b]),
+        Node::Piece(_, _, a, b) => Some([a, b]),
+        Node::Select(condition, ..) => Some([condition; 2]),
+        Node::Curve(curve, part, a) if graph.curve_of(curve).jumps(part) => Some([a, a]),
+        _ => None,
+    };
+    let moves = |over: [NodeId; 2]| !graph.variables(&over).into_iter().all(is_steady);
+    graph.reachable(roots).into_iter().filter_map(decides).any(moves)
 }
 
 /// `x - floor(x)` compared with a number between 0 and 1, on either side.
-fn phase(graph: &mut Graph, a: NodeId, b: NodeId, is_strict: bool) -> Option<NodeId> {
+fn phase(
+    graph: &mut Graph,
+    a: NodeId,
+    b: NodeId,
+    is_strict: bool,
+    is_steady: &dyn Fn(u32) -> bool,
+) -> Option<NodeId> {
     let whole_part = |graph: &Graph, id| match graph.node(id) {
         Node::Binary(Binary::Sub, x, whole) if graph.node(whole) == Node::Unary(Unary::Floor, x) => Some(x),
         _ => None,
@@ -71,6 +92,9 @@ fn phase(graph: &mut Graph, a: NodeId, b: NodeId, is_strict: bool) -> Option<Nod
         (None, Some(x)) if number(graph, a).is_some() => (x, a, false),
         _ => return None,
     };
+    if has_steps(graph, &[x], is_steady) {
+        return None;
+    }
     let zero = graph.constant(0.0);
     let beyond = graph.binary(Binary::Sub, x, level);
     let [begins, ends] = [x, beyond].map(|x| graph.unary(Unary::SinPi, x));

@@ -75,10 +75,14 @@ impl RuleBuilder<'_> {
                     tasks.extend([Task::Emit(step), Task::Visit(b, jumps), Task::Visit(a, jumps)]);
                 }
                 Node::Binary(op, a, b) => {
+                    let is_steady = |v| atoms.steady.contains(&v);
                     if let Some(plain) = self.plain(id, span, &atoms.steady) {
-                        tasks.push(Task::Visit(plain, jumps || self.has_steps(id)));
+                        let jumps = jumps || comparisons::has_steps(&self.scope.graph, &[id], &is_steady);
+                        tasks.push(Task::Visit(plain, jumps));
                         continue;
                     }
+                    // What is left of it may jump itself.
+                    let jumps = jumps && !comparisons::has_steps(&self.scope.graph, &[a, b], &is_steady);
                     let comparison = match op {
                         Binary::Lt => Comparison::Less,
                         Binary::Le => Comparison::LessOrEqual,
@@ -103,14 +107,6 @@ impl RuleBuilder<'_> {
             }
         }
         Some(Condition(steps))
-    }
-
-    /// True if a whole part or a sign is a part of an expression.
-    fn has_steps(&self, id: NodeId) -> bool {
-        let graph = &self.scope.graph;
-        let is_step =
-            |part| matches!(graph.node(part), Node::Unary(Unary::Floor | Unary::Ceil | Unary::Sign, _));
-        graph.reachable(&[id]).into_iter().any(is_step)
     }
 
     /// A comparison in terms of what moves, if there is one; where it is written, and as what, holds for all of its parts.

@@ -72,6 +72,11 @@ pub struct Rule {
 }
 
 impl Rule {
+    /// True if the condition of a production asks for the sign of an atom.
+    pub fn decides_productions(&self, atom: usize) -> bool {
+        self.produces.iter().any(|produce| produce.guard.atoms().any(|(other, _)| other == atom))
+    }
+
     /// True if the behaviour of a module under this rule never changes: no conditions, no productions, at most one
     /// unconditional clause of equations without switches.
     pub fn is_plain(&self) -> bool {

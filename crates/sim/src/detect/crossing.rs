@@ -5,12 +5,12 @@
 //! Elsewhere the difference is bounded by interval arithmetic and its roots are isolated ([`CrossingDetector::root`]),
 //! unless the bounds over the whole path already exclude a change of sign.
 
-use crate::detect::signs::{Reach, opposite, rate_at, reach, sign_of};
+use crate::detect::signs::{Reach, is_at, opposite, rate_at, reach, sign_of};
 use crate::world::coupled_solution::DenseComponent;
 use crate::world::path::Path;
 use crate::world::state::State;
 use dlsys_expr::{Binary, Dual, Interval, Program, Scratch, Value};
-use dlsys_model::{AffineSum, Condition, Rule, Sign, ZeroCrossing};
+use dlsys_model::{AffineSum, Rule, Sign, ZeroCrossing};
 use dlsys_ode::{Function, Root, first_root};
 use dlsys_tree::SimTime;
 
@@ -287,8 +287,7 @@ impl CrossingDetector {
     /// The parameter of the module, or of a neighbour, or the time, whose value the condition of a production compares with a level that rests, and the level.
     /// Without it a successor that gets a value at its limit would get a rounding of the limit, perhaps on its other side.
     fn level_of(&mut self, path: &Path, atom: usize) -> Option<(usize, f64)> {
-        let decides = |condition: &Condition| condition.atoms().any(|(other, _)| other == atom);
-        if !path.rule.produces.iter().any(|produce| decides(&produce.guard)) {
+        if !path.rule.decides_productions(atom) {
             return None;
         }
         let (variable, level) = match &path.rule.zero_crossings(path.state.solve)[atom] {
@@ -354,10 +353,16 @@ impl CrossingDetector {
             values.extend(path.state.switches.iter().map(|&on| f64::from(u8::from(on))));
             rate_at(clause, values, variable, level, scratch, rates)
         };
-        let time = match reach(variable, t, level, trajectory, start, exact)? {
-            Reach::At(time) => time,
-            Reach::Age(age) => path.world.tree.birth(path.state.id).after(age),
-            Reach::After(tau) => path.state.since.after(tau),
+        let met = reach(variable, t, level, trajectory, start, exact);
+        let is_known = met.is_some();
+        let time = match met {
+            Some(Reach::At(time)) => time,
+            Some(Reach::Age(age)) => path.world.tree.birth(path.state.id).after(age),
+            Some(Reach::After(tau)) => path.state.since.after(tau),
+            // Another event of the module may come a rounding before this one. It leaves the variable at the level or beyond it, and the
+            // sign as it was.
+            None if trajectory.is_some() && is_at(level, start) => path.start,
+            None => return None,
         };
         let position = time.since(path.start) / path.h;
         let level = (variable <= t).then_some((variable, level));
@@ -372,8 +377,9 @@ impl CrossingDetector {
         path.departure(&mut self.departure);
         self.departure_out.resize(path.rule.sides.outputs(), Dual::constant(0.0));
         path.rule.sides.eval(&self.departure, &mut self.departure_scratch, &mut self.departure_out);
-        let slope = self.departure_out[2 * atom].rate - self.departure_out[2 * atom + 1].rate;
-        if Sign::of(slope) != crossing.after {
+        let [a, b] = [self.departure_out[2 * atom], self.departure_out[2 * atom + 1]];
+        let is_still_to_come = is_known || (a.value - b.value) * sign_of(sign) <= 0.0;
+        if Sign::of(a.rate - b.rate) != crossing.after || !is_still_to_come {
             return None;
         }
         let time = if position > 0.0 { time } else { path.start };

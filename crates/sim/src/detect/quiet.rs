@@ -6,7 +6,7 @@
 //! keeps clear of the level by the margin that a search asks for. All else is left to the search.
 
 use super::crossing::{LocationMethod, is_clear_of, is_unreachable, level_of_dense, location_method};
-use super::signs::{Reach, reach};
+use super::signs::{Reach, is_at, reach};
 use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::coupled_solution::CoupledSolution;
@@ -103,7 +103,8 @@ impl Outlook<'_> {
             Some(Reach::At(time)) => Meeting::At(time),
             Some(Reach::Age(age)) => Meeting::At(self.world.tree.birth(self.state.id).after(age)),
             Some(Reach::After(tau)) => Meeting::At(self.state.since.after(tau)),
-            None if is_known => Meeting::Never,
+            // At the level, its sign may be yet to turn.
+            None if is_known && !is_at(level, start) => Meeting::Never,
             None => Meeting::Unknown,
         }
     }

@@ -135,6 +135,11 @@ pub fn reach(
     }
 }
 
+/// True if a value may be a level but for the rounding of what it was computed from.
+pub fn is_at(level: f64, value: f64) -> bool {
+    (value - level).abs() <= NEAR * value.abs().max(level.abs()).max(1.0)
+}
+
 /// Half the width of the difference of two intervals; 0 where a side jumps or is unbounded.
 pub fn half_width(a: Interval, b: Interval) -> f64 {
     let width = 0.5 * ((a.hi - a.lo) + (b.hi - b.lo));

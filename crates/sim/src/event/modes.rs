@@ -370,12 +370,24 @@ impl EventStage<'_, '_> {
                     Sign::Zero => {
                         probed = true;
                         // Not moving yet, or at rest: look ahead, first a little, then further.
-                        let seen = [1e-9, 1e-6, 1e-3].into_iter().map(|part| {
+                        let mut ahead = |part: f64| {
                             self.flow().moving_variables(id, part * reach.min(1e12), &mut moving);
                             rule.sides.eval(&moving, &mut scratch, &mut out);
-                            clear(out[2 * atom].rate - out[2 * atom + 1].rate, 1e-12)
+                            [out[2 * atom], out[2 * atom + 1]]
+                        };
+                        let moves = [1e-9, 1e-6, 1e-3].into_iter().find_map(|part| {
+                            let [a, b] = ahead(part);
+                            Some(clear(a.rate - b.rate, 1e-12)).filter(|sign| *sign != Sign::Zero)
                         });
-                        { seen }.find(|sign| *sign != Sign::Zero).unwrap_or(Sign::Zero)
+                        match moves {
+                            Some(sign) => sign,
+                            // What has jumped is there at once; productions take place behind a jump.
+                            None if rule.jumping_whole[atom] && !rule.decides_productions(atom) => {
+                                let [a, b] = ahead(1e-9);
+                                Sign::of(a.value - b.value)
+                            }
+                            None => Sign::Zero,
+                        }
                     }
                     sign => sign,
                 },
