@@ -293,6 +293,7 @@ impl ModelRun {
                 )));
             }
         }
+        let settings = Settings { horizon: times.last().copied().unwrap_or(settings.horizon), ..settings };
         let (remarks, sway) = Default::default();
         Ok(ModelRun { session, remarks, times, settings, detail: None, sway, clock: Clock::default() })
     }

@@ -114,6 +114,7 @@ impl Budget {
             return Err(Error::TooManyEvents { site: site(), limit, foreseen: None });
         }
         let (some, time) = (done - self.done, at.since(self.mark));
+        let until = SimTime::new(until.to_f64().max(settings.horizon));
         let foreseen = some as f64 * (until.since(at).max(0.0) / time.max(0.0));
         if until.to_f64().is_finite() && self.next > 0 && foreseen > FAR_TOO_MANY * limit as f64 {
             if self.slow == 0 || time > BETTER * self.first {

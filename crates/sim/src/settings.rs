@@ -111,6 +111,9 @@ pub struct Settings {
     /// More productions and steps than this are an error; so is a run that is foreseen to need a hundred times as many, at
     /// a pace that hardly brings time on.
     pub max_events: u64,
+    /// The last time that will be asked for, if that is known: what a run needs is foreseen up to there, whatever time is asked for
+    /// first. Results do not depend on it.
+    pub horizon: f64,
     /// More seconds than this, spent in calls of the simulation, are an error. Infinite by default.
     pub max_seconds: f64,
     /// More bytes of memory than this, of the process as a whole where the system tells them, are an error. By
@@ -145,6 +148,7 @@ impl Default for Settings {
             seed: 0,
             max_modules: Settings::MODULES,
             max_events: Settings::EVENTS,
+            horizon: f64::NEG_INFINITY,
             max_seconds: f64::INFINITY,
             max_memory: u64::MAX,
             threads: 1,
