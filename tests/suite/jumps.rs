@@ -397,3 +397,35 @@ fn whole_parts_of_whole_parts_are_counted_at_their_jumps() {
     let text = "initial string: A(0, 0.3)\nA(x, y): solve dx/dt = if floor(y) - floor(floor(y)/2)*2 < 0.5 then 1 else 3, dy/dt = 1";
     reaches(text, 2.0, "A", &[0.7 + 3.0 + 0.3, 2.3]);
 }
+
+/// What jumps in a sum over what is attached jumps in the sum.
+#[test]
+fn jumps_within_aggregates_are_counted_once() {
+    let sum = "sum(Leaf(w, r): if w > 1 then 1 else 0)";
+    let ripe = format!(
+        "initial string: Stem(0, 0) [ Leaf(-1.048, 1.606) ] [ Leaf(-0.437, 0.66) ]\nStem(n, k): if {sum} != n produce Stem({sum}, k + 1)\nLeaf(w, r): solve dw/dt = r"
+    );
+    reaches(&ripe, 5.0, "Stem", &[2.0, 2.0]);
+    // Falling from 0.5 through 0, -1 and -2.
+    for (form, end) in [
+        ("sum(M(w): floor(w))", -3.0),
+        ("largest(M(w): floor(w))", -3.0),
+        ("floor(sum(M(w): floor(w))/1)", -3.0),
+        ("2*floor(sum(M(w): ceil(w)))", -4.0),
+    ] {
+        let text = format!(
+            "initial string: Q(0, 0) [ M(0.5) ]\nQ(n, k): if {form} != n produce Q({form}, k + 1)\nM(w): solve dw/dt = -1"
+        );
+        // One production at once where it does not begin at 0, and one for each whole number.
+        let count = if form.contains("ceil") { 4.0 } else { 3.0 };
+        reaches(&text, 3.14, "Q", &[end, count]);
+    }
+    let both = "sum(M(w, r): floor(w) - 2*floor(w/2))";
+    let text = format!(
+        "initial string: Q(0, 0) [ M(0.3, 1) ] [ M(0.45, -0.7) ]\nQ(n, k): if {both} != n produce Q({both}, k + 1)\nM(w, r): solve dw/dt = r"
+    );
+    // The first is odd from 0.7 to 1.7, the second from 0.45/0.7 to 1.45/0.7.
+    for (t, n, k) in [(0.6, 0.0, 0.0), (0.66, 1.0, 1.0), (1.0, 2.0, 2.0), (1.9, 1.0, 3.0), (2.1, 0.0, 4.0)] {
+        reaches(&text, t, "Q", &[n, k]);
+    }
+}

@@ -146,7 +146,8 @@ impl RuleBuilder<'_> {
         self.scope.gathered.clear();
         good &= self.locals(rule, &mut variables);
         let frame = Frame { rule, variables, own, count };
-        let mut atoms = Atoms::of(self.steady(rule));
+        let first_aggregate = count - 2 - written as usize;
+        let mut atoms = Atoms::of(self.steady(rule), first_aggregate as u32);
         let guards = self.guards(&frame, &mut atoms, &mut good);
         self.begin_handing(&rule.predecessor);
         let productions = self.productions(&frame, &guards, &mut atoms, &mut good);
@@ -169,7 +170,7 @@ impl RuleBuilder<'_> {
             right: rule.right.iter().map(|m| self.pattern(m.clone())).collect(),
             right_shape: rule.right_shape.iter().map(|part| turn(*part)).collect(),
             aggregates,
-            first_aggregate: count - 2 - written as usize,
+            first_aggregate,
             variables: count,
             sides: atoms.sides,
             atoms: atoms.spans,

@@ -11,23 +11,36 @@ use dlsys_expr::{Binary, Graph, Node, NodeId, Unary};
 /// Whole numbers below this are added without rounding.
 const EXACT: f64 = (1u64 << 50) as f64;
 
+/// How variables move.
+pub struct Moves<'v> {
+    /// Variables that do not.
+    pub steady: &'v [u32],
+    /// Variables that jump: aggregates of what does.
+    pub jumping: &'v [u32],
+}
+
+impl Moves<'_> {
+    fn is_steady(&self, variable: u32) -> bool {
+        self.steady.contains(&variable)
+    }
+}
+
 /// A comparison that holds for the same values and compares what moves; None if there is none. Comparisons with NaN keep their results.
-/// `is_steady` tells variables that do not move.
-pub fn plain(graph: &mut Graph, id: NodeId, is_steady: &dyn Fn(u32) -> bool) -> Option<NodeId> {
+pub fn plain(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<NodeId> {
     let Node::Binary(op, a, b) = graph.node(id) else { return None };
     let (a, b) = shifted(graph, a, b);
     let (b, a) = shifted(graph, b, a);
     match op {
-        Binary::Eq => equal(graph, a, b, is_steady).or_else(|| equal(graph, b, a, is_steady)),
+        Binary::Eq => equal(graph, a, b, moves).or_else(|| equal(graph, b, a, moves)),
         Binary::Ne => {
-            let equal = equal(graph, a, b, is_steady).or_else(|| equal(graph, b, a, is_steady))?;
+            let equal = equal(graph, a, b, moves).or_else(|| equal(graph, b, a, moves))?;
             Some(graph.unary(Unary::Not, equal))
         }
         Binary::Lt | Binary::Le => {
             let is_strict = op == Binary::Lt;
-            phase(graph, a, b, is_strict, is_steady)
-                .or_else(|| below(graph, a, b, is_strict, is_steady))
-                .or_else(|| above(graph, a, b, is_strict, is_steady))
+            phase(graph, a, b, is_strict, moves)
+                .or_else(|| below(graph, a, b, is_strict, moves))
+                .or_else(|| above(graph, a, b, is_strict, moves))
         }
         _ => None,
     }
@@ -55,33 +68,28 @@ fn shifted(graph: &mut Graph, sum: NodeId, level: NodeId) -> (NodeId, NodeId) {
 
 /// True if an expression moves without jumps, so that its whole part jumps where it passes whole numbers, and a level does not move, so that its
 /// whole part does not.
-fn jumps(graph: &Graph, x: NodeId, level: NodeId, is_steady: &dyn Fn(u32) -> bool) -> bool {
-    let rests = |id| graph.variables(&[id]).into_iter().all(is_steady);
-    rests(level) && !rests(x) && !has_steps(graph, &[x], is_steady)
+fn jumps(graph: &Graph, x: NodeId, level: NodeId, moves: &Moves<'_>) -> bool {
+    let rests = |id| graph.variables(&[id]).into_iter().all(|v| moves.is_steady(v));
+    rests(level) && !rests(x) && !has_steps(graph, &[x], moves)
 }
 
 /// True if expressions jump while variables move: they contain a whole part, a sign, a choice or the like of what is not steady.
-pub fn has_steps(graph: &Graph, roots: &[NodeId], is_steady: &dyn Fn(u32) -> bool) -> bool {
+pub fn has_steps(graph: &Graph, roots: &[NodeId], moves: &Moves<'_>) -> bool {
     let decides = |id: NodeId| match graph.node(id) {
         Node::Unary(Unary::Floor | Unary::Ceil | Unary::Sign, a) | Node::Element(_, a) => Some([a, a]),
         Node::Binary(Binary::Lt | Binary::Le | Binary::Eq | Binary::Ne, a, b) => Some([a, b]),
         Node::Piece(_, _, a, b) => Some([a, b]),
         Node::Select(condition, ..) => Some([condition; 2]),
         Node::Curve(curve, part, a) if graph.curve_of(curve).jumps(part) => Some([a, a]),
+        Node::Var(v) if moves.jumping.contains(&v) => Some([id, id]),
         _ => None,
     };
-    let moves = |over: [NodeId; 2]| !graph.variables(&over).into_iter().all(is_steady);
-    graph.reachable(roots).into_iter().filter_map(decides).any(moves)
+    let moving = |over: [NodeId; 2]| !graph.variables(&over).into_iter().all(|v| moves.is_steady(v));
+    graph.reachable(roots).into_iter().filter_map(decides).any(moving)
 }
 
 /// `x - floor(x)` compared with a number between 0 and 1, on either side.
-fn phase(
-    graph: &mut Graph,
-    a: NodeId,
-    b: NodeId,
-    is_strict: bool,
-    is_steady: &dyn Fn(u32) -> bool,
-) -> Option<NodeId> {
+fn phase(graph: &mut Graph, a: NodeId, b: NodeId, is_strict: bool, moves: &Moves<'_>) -> Option<NodeId> {
     let whole_part = |graph: &Graph, id| match graph.node(id) {
         Node::Binary(Binary::Sub, x, whole) if graph.node(whole) == Node::Unary(Unary::Floor, x) => Some(x),
         _ => None,
@@ -92,7 +100,7 @@ fn phase(
         (None, Some(x)) if number(graph, a).is_some() => (x, a, false),
         _ => return None,
     };
-    if has_steps(graph, &[x], is_steady) {
+    if has_steps(graph, &[x], moves) {
         return None;
     }
     let zero = graph.constant(0.0);
@@ -126,10 +134,10 @@ fn whole(graph: &mut Graph, op: Unary, x: NodeId, n: f64) -> NodeId {
 }
 
 /// `step = level`.
-fn equal(graph: &mut Graph, step: NodeId, level: NodeId, is_steady: &dyn Fn(u32) -> bool) -> Option<NodeId> {
+fn equal(graph: &mut Graph, step: NodeId, level: NodeId, moves: &Moves<'_>) -> Option<NodeId> {
     let zero = graph.constant(0.0);
     match graph.node(step) {
-        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if jumps(graph, x, level, is_steady) => {
+        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if jumps(graph, x, level, moves) => {
             let part = graph.unary(op, level);
             let is_whole = graph.binary(Binary::Eq, level, part);
             // From level to level + 1, or from level - 1 to level.
@@ -151,9 +159,7 @@ fn equal(graph: &mut Graph, step: NodeId, level: NodeId, is_steady: &dyn Fn(u32)
                 let found = signs.into_iter().find(|(sign, ..)| *sign == level);
                 return Some(found.map_or(zero, |(_, op, a, b)| graph.binary(op, a, b)));
             }
-            sign_against(graph, (x, level), is_steady, |graph, sign, level| {
-                graph.binary(Binary::Eq, level, sign)
-            })
+            sign_against(graph, (x, level), moves, |graph, sign, level| graph.binary(Binary::Eq, level, sign))
         }
         Node::Unary(Unary::Abs, x) if x == level => Some(ordered(graph, false, zero, x)),
         Node::Binary(op @ (Binary::Min | Binary::Max), x, y) if x == level || y == level => {
@@ -169,10 +175,10 @@ fn equal(graph: &mut Graph, step: NodeId, level: NodeId, is_steady: &dyn Fn(u32)
 fn sign_against(
     graph: &mut Graph,
     (x, level): (NodeId, NodeId),
-    is_steady: &dyn Fn(u32) -> bool,
+    moves: &Moves<'_>,
     compare: impl Fn(&mut Graph, NodeId, NodeId) -> NodeId,
 ) -> Option<NodeId> {
-    if !jumps(graph, x, level, is_steady) {
+    if !jumps(graph, x, level, moves) {
         return None;
     }
     let zero = graph.constant(0.0);
@@ -191,10 +197,10 @@ fn below(
     step: NodeId,
     level: NodeId,
     is_strict: bool,
-    is_steady: &dyn Fn(u32) -> bool,
+    moves: &Moves<'_>,
 ) -> Option<NodeId> {
     match graph.node(step) {
-        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if jumps(graph, x, level, is_steady) => {
+        Node::Unary(op @ (Unary::Floor | Unary::Ceil), x) if jumps(graph, x, level, moves) => {
             // floor(x) < l: x < ceil(l). floor(x) <= l: x < floor(l) + 1. ceil(x) < l: x <= ceil(l) - 1. ceil(x) <= l: x <= floor(l).
             let is_floor = op == Unary::Floor;
             let part = if is_strict { Unary::Ceil } else { Unary::Floor };
@@ -205,7 +211,7 @@ fn below(
         Node::Unary(Unary::Sign, x) => {
             let zero = graph.constant(0.0);
             let Some(level) = graph.as_constant(level) else {
-                return sign_against(graph, (x, level), is_steady, |graph, sign, level| {
+                return sign_against(graph, (x, level), moves, |graph, sign, level| {
                     ordered(graph, is_strict, sign, level)
                 });
             };
@@ -233,16 +239,16 @@ fn above(
     level: NodeId,
     step: NodeId,
     is_strict: bool,
-    is_steady: &dyn Fn(u32) -> bool,
+    moves: &Moves<'_>,
 ) -> Option<NodeId> {
     if let Node::Unary(Unary::Sign, x) = graph.node(step)
         && graph.as_constant(level).is_none()
     {
-        return sign_against(graph, (x, level), is_steady, |graph, sign, level| {
+        return sign_against(graph, (x, level), moves, |graph, sign, level| {
             ordered(graph, is_strict, level, sign)
         });
     }
-    let opposite = below(graph, step, level, !is_strict, is_steady)?;
+    let opposite = below(graph, step, level, !is_strict, moves)?;
     match graph.node(opposite) {
         Node::Binary(op @ (Binary::Lt | Binary::Le), x, y) => Some(ordered(graph, op == Binary::Le, y, x)),
         _ => None,
@@ -251,7 +257,7 @@ fn above(
 
 #[cfg(test)]
 mod tests {
-    use super::plain;
+    use super::{Moves, plain};
     use dlsys_expr::{Binary, Graph, NodeId, Program, Unary};
 
     /// The value of an expression of x and y.
@@ -288,7 +294,10 @@ mod tests {
                     for (a, b) in [(step, level), (level, step)] {
                         let written = graph.binary(op, a, b);
                         // y rests, x moves.
-                        let Some(made) = plain(&mut graph, written, &|v| v == 1) else { continue };
+                        let Some(made) = plain(&mut graph, written, &Moves { steady: &[1], jumping: &[] })
+                        else {
+                            continue;
+                        };
                         known += 1;
                         for &x in &numbers {
                             for &y in &numbers {

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::advice;
-use crate::comparisons;
+use crate::comparisons::{self, Moves};
 use crate::rules::RuleBuilder;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_expr::{Binary, Node, NodeId, Unary};
@@ -36,6 +36,8 @@ pub struct Atoms {
     pub jumping: Vec<bool>,
     /// The module's parameters that no clause of the rule moves.
     steady: Vec<u32>,
+    /// The variable of the first aggregate.
+    first_aggregate: u32,
     index: HashMap<(NodeId, NodeId), u32>,
 }
 
@@ -47,6 +49,7 @@ impl RuleBuilder<'_> {
             Visit(NodeId, bool),
             Emit(ConditionStep),
         }
+        let jumping = self.jumping_aggregates(atoms);
         let mut steps = Vec::new();
         let mut tasks = vec![Task::Visit(root, false)];
         while let Some(task) = tasks.pop() {
@@ -75,14 +78,14 @@ impl RuleBuilder<'_> {
                     tasks.extend([Task::Emit(step), Task::Visit(b, jumps), Task::Visit(a, jumps)]);
                 }
                 Node::Binary(op, a, b) => {
-                    let is_steady = |v| atoms.steady.contains(&v);
-                    if let Some(plain) = self.plain(id, span, &atoms.steady) {
-                        let jumps = jumps || comparisons::has_steps(&self.scope.graph, &[id], &is_steady);
+                    let moves = Moves { steady: &atoms.steady, jumping: &jumping };
+                    if let Some(plain) = self.plain(id, span, &moves) {
+                        let jumps = jumps || comparisons::has_steps(&self.scope.graph, &[id], &moves);
                         tasks.push(Task::Visit(plain, jumps));
                         continue;
                     }
                     // What is left of it may jump itself.
-                    let jumps = jumps && !comparisons::has_steps(&self.scope.graph, &[a, b], &is_steady);
+                    let jumps = jumps && !comparisons::has_steps(&self.scope.graph, &[a, b], &moves);
                     let comparison = match op {
                         Binary::Lt => Comparison::Less,
                         Binary::Le => Comparison::LessOrEqual,
@@ -109,9 +112,17 @@ impl RuleBuilder<'_> {
         Some(Condition(steps))
     }
 
+    /// The variables of the aggregates whose terms jump.
+    fn jumping_aggregates(&self, atoms: &Atoms) -> Vec<u32> {
+        let moves = Moves { steady: &atoms.steady, jumping: &[] };
+        let jumps = |term| comparisons::has_steps(&self.scope.graph, &[term], &moves);
+        let all = (atoms.first_aggregate..).zip(&self.scope.gathered);
+        all.filter(|(_, gathered)| jumps(gathered.term)).map(|(variable, _)| variable).collect()
+    }
+
     /// A comparison in terms of what moves, if there is one; where it is written, and as what, holds for all of its parts.
-    fn plain(&mut self, id: NodeId, span: Span, steady: &[u32]) -> Option<NodeId> {
-        let plain = comparisons::plain(&mut self.scope.graph, id, &|v| steady.contains(&v))?;
+    fn plain(&mut self, id: NodeId, span: Span, moves: &Moves<'_>) -> Option<NodeId> {
+        let plain = comparisons::plain(&mut self.scope.graph, id, moves)?;
         let (at, written) = match self.scope.comparisons.get(&id) {
             Some((at, sides)) => (*at, Some(sides.written.clone())),
             None => (span, None),
@@ -129,9 +140,9 @@ impl RuleBuilder<'_> {
 }
 
 impl Atoms {
-    /// None yet, of a module of which these parameters do not move.
-    pub fn of(steady: Vec<u32>) -> Atoms {
-        Atoms { steady, ..Atoms::default() }
+    /// None yet, of a module of which these parameters do not move; the variable of its first aggregate.
+    pub fn of(steady: Vec<u32>, first_aggregate: u32) -> Atoms {
+        Atoms { steady, first_aggregate, ..Atoms::default() }
     }
 
     /// The step that compares two sides; each pair is stored once, in either order.

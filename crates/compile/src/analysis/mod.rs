@@ -188,9 +188,17 @@ fn aggregates(graph: &mut Graph, moving: &Moving, index: usize, rule: &ResolvedR
     all
 }
 
-/// By atom: true if a side jumps, and the comparison was not taken apart.
-fn jumping_whole(sides: &Program, jumping: &[bool]) -> Vec<bool> {
-    let jumps = |atom: usize| sides.output_jumps(2 * atom) || sides.output_jumps(2 * atom + 1);
+/// By atom: true if a side jumps, itself or through an aggregate, of which there are these from a variable on, and the comparison was not taken
+/// apart.
+fn jumping_whole(sides: &Program, (first, aggregates): (usize, &[Aggregate]), jumping: &[bool]) -> Vec<bool> {
+    let gathered: Vec<usize> = (first..)
+        .zip(aggregates)
+        .filter(|(_, aggregate)| aggregate.term.output_jumps(0))
+        .map(|(variable, _)| variable)
+        .collect();
+    let reads = |side: usize| sides.output_reads(side).iter().any(|variable| gathered.contains(variable));
+    let side_jumps = |side: usize| sides.output_jumps(side) || !gathered.is_empty() && reads(side);
+    let jumps = |atom: usize| side_jumps(2 * atom) || side_jumps(2 * atom + 1);
     jumping.iter().enumerate().map(|(atom, apart)| !apart && jumps(atom)).collect()
 }
 
@@ -228,7 +236,7 @@ fn compile_rule(
         right,
         right_shape: declared.right_shape,
         atom_reads: (0..declared.atoms.len()).map(|atom| atom_reads(&sides, atom)).collect(),
-        jumping_whole: jumping_whole(&sides, &declared.jumping),
+        jumping_whole: jumping_whole(&sides, (declared.first_aggregate, &aggregates), &declared.jumping),
         watched: watched(&sides, &aggregates, count, declared.first_aggregate),
         aggregates,
         first_aggregate: declared.first_aggregate,
