@@ -69,6 +69,8 @@ const PLAIN: usize = 2000;
 const WIDEST_STROKE: f64 = 16.0;
 /// A stem whose visible length is less than this many widths is painted by its shades: its ends are much of it.
 const SHORTEST_GRADIENT: f64 = 1.0;
+/// What goes on beyond the page is traced for so many cells: outlines are not exact, and along the margin of the page none should be.
+const BEYOND: f64 = 4.0;
 /// Stems thinner than this many pixels of the page hide nothing: between the middles of cells they would have gaps.
 const LEAST_PIXELS: f64 = 1.5;
 
@@ -122,7 +124,8 @@ pub(super) fn elements(
     lit.shift(low);
     let size = size.map(|side| side as usize);
     let mut rasters = style.memory.map(Memory::take).unwrap_or_default();
-    let most = if style.memory.is_some() { (whole[0] * whole[1]) as usize } else { 0 };
+    let [widest, highest] = whole.map(|side| side + 2.0 * (BEYOND + 1.0));
+    let most = if style.memory.is_some() { (widest * highest) as usize } else { 0 };
     let (nearest, spans) = label::nearest(&mesh, &lit, (size, most), &mut rasters);
     let around = spans.widened();
     let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };
@@ -224,8 +227,8 @@ fn mesh(
     Triangles::of(&Solid::of(scene, tubes, Cow::Borrowed(&scene.surfaces)), kept)
 }
 
-/// The rectangle of cells that triangles touch, within a picture of this size, and a cell around it, which may be outside of the picture:
-/// its first column and row, and its size.
+/// The rectangle of cells that triangles touch, within a picture of this size or a little beyond, and a cell around it: its first column and
+/// row, and its size.
 fn drawn(mesh: &Triangles, lit: &Lit, size: [f64; 2]) -> [[f64; 2]; 2] {
     let (mut low, mut high) = (size, [0.0; 2]);
     for corner in (0..mesh.faces.len()).flat_map(|n| lit.corners(n)) {
@@ -234,8 +237,8 @@ fn drawn(mesh: &Triangles, lit: &Lit, size: [f64; 2]) -> [[f64; 2]; 2] {
             high[k] = at.max(high[k]);
         }
     }
-    let low = [0, 1].map(|k| low[k].floor().clamp(0.0, size[k] - 1.0) - 1.0);
-    let high = [0, 1].map(|k| high[k].ceil().clamp(low[k] + 2.0, size[k]) + 1.0);
+    let low = [0, 1].map(|k| low[k].floor().clamp(-BEYOND, size[k] - 1.0) - 1.0);
+    let high = [0, 1].map(|k| high[k].ceil().clamp(low[k] + 2.0, size[k] + BEYOND) + 1.0);
     [low, [0, 1].map(|k| high[k] - low[k])]
 }
 
