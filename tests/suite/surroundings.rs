@@ -207,6 +207,16 @@ fn axes_of_few_segments_are_told_from_rods() {
         assert!(note.contains(&expected) && note.contains("`for i in 1 .. 5: ( F(x/5) )`"), "{said}");
         assert_eq!(few["few"], 1);
     }
+    // A shoot that has just begun is none of the long ones.
+    let text = "tissue wood = stiffness 1e10, density 500, damping 0.02\n\
+        initial string: @E(wood) !(0.01) [ F(1) F(1) F(1) F(1) ] [ F(1) ] [ F(1) F(1) ]\nframes 0 .. 1 step 1";
+    let folder_of_shoots = folder(&[("shoots.dls", text)]);
+    let shoots = &explained(&folder_of_shoots, "shoots.dls")["bending"]["axes"][0];
+    assert!(shoots["count"] == 3 && shoots["few"] == 1, "{shoots}");
+    let said = good(&folder_of_shoots, "explain shoots.dls");
+    let note = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(note.contains("note: an axis of 2 segments sags 8.3 %"), "{said}");
+    assert!(note.contains("1 of them has fewer than 4"), "{said}");
     let (enough, said) = axis(4);
     assert!(enough["few"] == 0 && !said.contains("note:") && !said.contains("F(x/5)"), "{said}");
 }

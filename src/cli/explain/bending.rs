@@ -66,8 +66,12 @@ pub struct AxisPlan {
     /// Number of axes of which the last four values are known.
     pub measured: usize,
     pub segments: Range,
-    /// Number of axes with fewer than [`LIKE_A_ROD`] segments.
+    /// Number of axes with fewer than [`LIKE_A_ROD`] segments, of those that are at least half as long as the longest: shoots that have just begun have few, and
+    /// hardly bend.
     pub few: usize,
+    /// Least number of segments of these.
+    #[serde(skip)]
+    fewest: usize,
     pub length: Range,
     pub width: Range,
     pub mass: Range,
@@ -158,16 +162,15 @@ impl AxisPlan {
     fn stiffer(&self) -> String {
         /// Per cent by which the first frequency of an axis of 1, 2 and 3 equal segments is higher than a rod's.
         const HIGHER: [u32; LIKE_A_ROD - 1] = [29, 5, 2];
-        let least = self.segments[0].max(1.0);
+        let least = self.fewest.max(1);
         // Under its own weight.
-        let less = brief(100.0 / (3.0 * least * least), 2);
-        let higher = HIGHER.get(least as usize - 1).unwrap_or(&0);
-        let axis = match least as usize {
-            1 => "an axis of 1 segment".to_owned(),
-            few => format!("an axis of {few} segments"),
-        };
+        let less = brief(100.0 / (3.0 * (least * least) as f64), 2);
+        let higher = HIGHER.get(least - 1).unwrap_or(&0);
+        let pieces = if least == 1 { "segment" } else { "segments" };
+        let axis = format!("an axis of {least} {pieces}");
         let others = match self.few {
             few if few == self.count => String::new(),
+            1 => format!("; 1 of them has fewer than {LIKE_A_ROD}"),
             few => format!("; {few} of them have fewer than {LIKE_A_ROD}"),
         };
         format!("{axis} sags {less} % less than a rod, and its frequency is {higher} % higher{others}")
@@ -300,6 +303,8 @@ fn plan(model: &Model, survey: &Survey, group: &[usize], wind: Option<f64>) -> A
     let axes = || group.iter().map(|i| &survey.axes()[*i]);
     let first = &survey.axes()[group[0]];
     let of = |value: fn(&Axis) -> f64| range(axes().map(value)).unwrap_or_default();
+    let longest = of(|axis| axis.length)[1];
+    let few = || axes().filter(|axis| axis.segments < LIKE_A_ROD && axis.length >= longest / 2.0);
     // Evenly over the group from the shortest to the longest, both included.
     let mut by_length = group.to_vec();
     by_length.sort_by(|a, b| survey.axes()[*a].length.total_cmp(&survey.axes()[*b].length));
@@ -319,7 +324,8 @@ fn plan(model: &Model, survey: &Survey, group: &[usize], wind: Option<f64>) -> A
         count: group.len(),
         measured: measured.len(),
         segments: of(|axis| axis.segments as f64),
-        few: axes().filter(|axis| axis.segments < LIKE_A_ROD).count(),
+        few: few().count(),
+        fewest: few().map(|axis| axis.segments).min().unwrap_or(LIKE_A_ROD),
         length: of(|axis| axis.length),
         width: of(|axis| axis.width),
         mass: of(|axis| axis.mass),
