@@ -12,6 +12,7 @@ fn usage(message: impl std::fmt::Display) -> Failure {
 
 /// The path of the file: as given, or in a folder under the name of the model.
 pub fn file_of(out: &Path, model: &Path, wanted: &str) -> Result<PathBuf, Failure> {
+    refuse_stream(out, &format!("a .{wanted} file has a name: `-o {}`", named(model, wanted)))?;
     let text = out.to_string_lossy();
     match out.extension().map(|extension| extension.to_string_lossy().to_lowercase()) {
         Some(extension) if extension == wanted && !out.is_dir() => Ok(out.to_owned()),
@@ -20,10 +21,21 @@ pub fn file_of(out: &Path, model: &Path, wanted: &str) -> Result<PathBuf, Failur
             out.display(),
             out.with_extension(wanted).display()
         ))),
-        _ => {
-            let stem = model.file_stem().map_or("plant".into(), |stem| stem.to_string_lossy());
-            Ok(out.join(format!("{stem}.{wanted}")))
-        }
+        _ => Ok(out.join(named(model, wanted))),
+    }
+}
+
+/// The name of a file that is called like a model.
+pub fn named(model: &Path, ending: &str) -> String {
+    let stem = model.file_stem().map_or("plant".into(), |stem| stem.to_string_lossy());
+    format!("{stem}.{ending}")
+}
+
+/// Refuses `-o -` where that is not standard output.
+pub fn refuse_stream(out: &Path, help: &str) -> Result<(), Failure> {
+    match out == Path::new("-") {
+        true => Err(usage(format!("`-o -` is standard output, to which only --format y4m writes; {help}"))),
+        false => Ok(()),
     }
 }
 

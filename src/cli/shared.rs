@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use super::args::IncludeArgs;
 use super::common::Failure;
 use super::values::{
-    bend_method, bend_tolerance, bytes, events, ground_rule, method, positive, setting, time, tolerance,
+    bend_method, bend_tolerance, bytes, events, ground_rule, method, positive, seed, setting, time, tolerance,
 };
 use crate::compile::Setting;
 use crate::interchange::Format;
@@ -60,7 +60,7 @@ pub struct SolverArgs {
     #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive)]
     pub step_size: Option<f64>,
     /// Seed of random numbers, for models that draw them: the same seed gives the same plant
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, default_value = "0", value_parser = seed)]
     pub seed: u64,
     /// Largest error of a step of stems that bend (`tissue`), relative to the size of the plant
     #[arg(long, value_name = "TOL", allow_negative_numbers = true, default_value = "1e-3", value_parser = bend_tolerance)]

@@ -320,6 +320,10 @@ pub(super) fn seeds(text: &str) -> Result<Seeds, String> {
     }
 }
 
+pub(super) fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
+}
+
 pub(super) fn runs(text: &str) -> Result<usize, String> {
     match text.parse::<usize>() {
         Ok(n) if (1..=1000).contains(&n) => Ok(n),

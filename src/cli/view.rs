@@ -7,6 +7,7 @@ use super::album::Keeping;
 use super::args::ViewArgs;
 use super::common::{Failure, ModelRun, cores, count_of, out_error};
 use super::frame_source::{Frame, Pass, play, play_at};
+use super::one_file::{named, refuse_stream};
 use super::progress::Progress;
 use crate::diagnostic::Diagnostic;
 use crate::player::{Clouds, Recorder, Recording, Stage, page};
@@ -25,7 +26,10 @@ const CERTAIN: usize = 4;
 /// Opens the window, or writes a page.
 pub fn view(args: &ViewArgs) -> Result<(), Failure> {
     match &args.out {
-        Some(out) => write(args, out),
+        Some(out) => {
+            refuse_stream(out, &format!("a page has a name: `-o {}`", named(&args.shared.model, "html")))?;
+            write(args, out)
+        }
         None => open(args),
     }
 }

@@ -161,6 +161,29 @@ fn frames_and_copies_change_no_bit() {
 }
 
 #[test]
+fn a_direction_is_one_however_long_it_is() {
+    for length in ["5e-324", "1e-300", "1", "1e200", "1e300"] {
+        let model = model(&format!(
+            "wind {length}, 0, {length} speed 3\ninitial string: A(0)\nA(x): solve dx/dt = flow_x(0, 1, 0)"
+        ));
+        let string = at(&mut started(&model), 1.0);
+        let x = string.iter().next().expect("one").parameters[0];
+        assert!((x - 3.0 / f64::sqrt(2.0)).abs() < 1e-6, "{length}: {x}");
+        let direction = Vector3::new(1.0, 0.0, 1.0) * length.parse::<f64>().expect("a number");
+        let field = dlsys::wind::Field::new(dlsys::wind::Description::new(direction, 3.0)).expect("a wind");
+        let velocity = field.at(0.0).expect("an instant").velocity(Vector3::zeros());
+        assert!((velocity.x - 3.0 / f64::sqrt(2.0)).abs() < 1e-12, "{length}: {velocity}");
+    }
+}
+
+#[test]
+fn ground_beyond_all_drawings_is_an_error_with_its_place() {
+    let text = messages("ground -1e300\ninitial string: F(1)");
+    assert!(text.contains("beyond the greatest coordinate") && text.contains("it is -1e300"), "{text}");
+    assert!(text.contains(":1:8") && text.contains("`ground 0`"), "{text}");
+}
+
+#[test]
 fn mistakes_have_a_place_and_a_remedy() {
     let still = "initial string: A(0)\nA(x): solve dx/dt = flow_x(x, 1, 0)";
     let text = messages(still);

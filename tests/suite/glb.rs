@@ -340,6 +340,9 @@ fn too_much_is_refused_before_it_fills_the_memory() {
     options = Options::new(&session.model, 0.01, 1e50);
     let refused = grow(&session, Settings::default(), &[0.0, 8.0], &options, &mut |_| true);
     assert!(matches!(refused, Err(Error::TooWide { .. })), "{refused:?}");
+    options = Options { floor: Some([-1e50, 0.0, 0.0, 10.0]), ..Options::new(&session.model, 0.01, 1.0) };
+    let refused = grow(&session, Settings::default(), &[0.0, 8.0], &options, &mut |_| true);
+    assert!(matches!(refused, Err(Error::GroundTooFar { metres: -1e50, .. })), "{refused:?}");
     options = Options::new(&session.model, 0.01, 1.0);
     let stopped = grow(&session, Settings::default(), &[0.0, 8.0], &options, &mut |_| false);
     assert!(matches!(stopped, Err(Error::Stopped { .. })), "{stopped:?}");

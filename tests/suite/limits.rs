@@ -278,6 +278,24 @@ fn little_memory_is_an_error_and_no_abort() {
     assert!(done.status.code() == Some(1) && said.contains("`--max-memory`"), "{said}");
 }
 
+/// Each frame of a sheet is made of what is seen of it, as a picture of its own is.
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "slow: a meadow"]
+fn sheets_of_fields_need_little_memory() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let out = folder.path().join("sheet.svg");
+    let flags = "--set plants=300 --at 3 --layout grid --width 200 --threads 1";
+    let program = env!("CARGO_BIN_EXE_dlsys");
+    let line =
+        format!("ulimit -v 1000000; exec {program} render models/meadow.dls {flags} -o {}", out.display());
+    let done = Command::new("sh").args(["-c", &line]).output().expect("a shell");
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success(), "{said}");
+    let picture = std::fs::read_to_string(out).expect("a picture");
+    assert!(picture.matches("<path").count() > 300, "{} bytes", picture.len());
+}
+
 #[test]
 fn a_bug_is_called_a_bug() {
     // The hook is there in builds with debug assertions only, as those of the tests are.

@@ -220,7 +220,8 @@ fn sheet(layout: Layout, format: Format, spacing: Spacing) -> (Vec<u8>, Fit) {
     let writer = SheetWriter::new(format, fit.clone(), sheet, page).expect("a picture");
     let mut assembly = writer.begin();
     for (i, scene) in scenes.iter().enumerate() {
-        assembly.add(writer.part(i, scene)).expect("short");
+        let part = writer.part(i, scene).expect("room");
+        assembly.add(part).expect("short");
     }
     (assembly.finish("a twig, t = 1 to 10"), fit)
 }
@@ -378,12 +379,25 @@ fn one_picture_is_a_file() {
     for (out, flags, expected) in [
         ("many.png", &["--at", "1,3"][..], "`--at T` for one frame in a file"),
         ("thesis.png", &["--at", "1"], "is not a PNG file"),
-        ("a.obj", &["--at", "1"], "-o names a folder"),
+        ("a.obj", &["--at", "1"], "materials in a file beside it"),
     ] {
         let out = at(out);
         let command = [&["render", "models/leaf.dls", "-o", &out][..], flags].concat();
         assert!(bad(&command).1.contains(expected), "{out}: {}", bad(&command).1);
     }
+    // Only a stream of pixels goes to standard output.
+    for (command, hint) in [
+        (&["render", "--format", "svg"][..], "`--at T -o leaf.svg`"),
+        (&["render", "--format", "obj"], "`-o frames`"),
+        (&["render", "--format", "glb"], "`-o leaf.glb`"),
+        (&["view"], "`-o leaf.html`"),
+    ] {
+        let command = [command, &["models/leaf.dls", "-o", "-"]].concat();
+        let said = bad(&command).1;
+        assert!(said.contains("`-o -` is standard output") && said.contains(hint), "{said}");
+    }
+    let said = bad(&["run", "models/leaf.dls", "--seed", "-1"]).1;
+    assert!(said.contains("expected a whole number from 0 to 18446744073709551615"), "{said}");
     assert_eq!(std::fs::read(at("thesis.png")).expect("a file"), b"years of work");
     let count = std::fs::read_dir(folder.path()).expect("a folder").count();
     assert_eq!(count, 6, "nothing is left over");

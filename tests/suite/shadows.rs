@@ -380,7 +380,9 @@ fn frames_of_a_grid_stand_on_one_floor() {
     let page = Page::new(sheet.picture, Size::Larger(600), Some(Page::BACKGROUND)).expect("small");
     let writer = SheetWriter::new(Format::PNG, fit, sheet, page).expect("a picture");
     let mut assembly = writer.begin();
-    (0..2).for_each(|frame| assembly.add(writer.part(frame, &scene)).expect("short"));
+    for frame in 0..2 {
+        assembly.add(writer.part(frame, &scene).expect("room")).expect("short");
+    }
     let file = assembly.finish("poles");
     let mut reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().expect("PNG");
     let mut data = vec![0; reader.output_buffer_size().expect("small")];

@@ -186,6 +186,41 @@ fn an_axis_has_the_frequency_and_the_stability_of_a_cantilever() {
     assert!(explained(&folder, "pole.dls")["bending"]["axes"][0]["cauchy"].is_null());
 }
 
+/// One F bends to one curvature: what is said of that is what comes out, against an axis of many.
+#[test]
+fn axes_of_few_segments_are_told_from_rods() {
+    let axis = |pieces: u32| {
+        let text = format!(
+            "tissue wood = stiffness 1e10, density 500, damping 0.02\nwind 1, 0, 0 speed 1\n\
+             initial string: @E(wood) !(0.01) for i in 1 .. {pieces}: ( F(1/{pieces}) )\nframes 0 .. 1 step 1"
+        );
+        let folder = folder(&[("axis.dls", &text)]);
+        (explained(&folder, "axis.dls")["bending"]["axes"][0].clone(), good(&folder, "explain axis.dls"))
+    };
+    let (rod, _) = axis(40);
+    for (pieces, less, higher) in [(1, "33", 29.0), (2, "8.3", 5.0), (3, "3.7", 2.0)] {
+        let (few, said) = axis(pieces);
+        let found = 100.0 * (value(&few, "frequency") / value(&rod, "frequency") - 1.0);
+        assert!((found - higher).abs() < 1.0, "{pieces}: {found}");
+        let note = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        let expected = format!("sags {less} % less than a rod, and its frequency is {higher} % higher");
+        assert!(note.contains(&expected) && note.contains("`for i in 1 .. 5: ( F(x/5) )`"), "{said}");
+        assert_eq!(few["few"], 1);
+    }
+    // A shoot that has just begun is none of the long ones.
+    let text = "tissue wood = stiffness 1e10, density 500, damping 0.02\n\
+        initial string: @E(wood) !(0.01) [ F(1) F(1) F(1) F(1) ] [ F(1) ] [ F(1) F(1) ]\nframes 0 .. 1 step 1";
+    let folder_of_shoots = folder(&[("shoots.dls", text)]);
+    let shoots = &explained(&folder_of_shoots, "shoots.dls")["bending"]["axes"][0];
+    assert!(shoots["count"] == 3 && shoots["few"] == 1, "{shoots}");
+    let said = good(&folder_of_shoots, "explain shoots.dls");
+    let note = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(note.contains("note: an axis of 2 segments sags 8.3 %"), "{said}");
+    assert!(note.contains("1 of them has fewer than 4"), "{said}");
+    let (enough, said) = axis(4);
+    assert!(enough["few"] == 0 && !said.contains("note:") && !said.contains("F(x/5)"), "{said}");
+}
+
 #[test]
 fn explain_says_what_makes_stems_work() {
     let sagging = POLE.replace("damping 0.02", "damping 0.02, sag");

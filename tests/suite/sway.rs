@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use dlsys::scene::{Point, Scene};
 use dlsys::session::{Nursery, Session};
-use dlsys::sim::Settings;
+use dlsys::sim::{BendSettings, Settings};
 use dlsys::tree::ModuleString;
 
 use super::common;
@@ -22,10 +22,14 @@ fn read(name: &str, text: &str) -> Session {
 
 /// The scenes of a model at some times, which need not be in order.
 fn scenes(session: &Session, times: &[f64]) -> Vec<Scene> {
-    let nursery = Nursery::new(&session.model, Settings::default());
+    scenes_with(session, times, Settings::default())
+}
+
+fn scenes_with(session: &Session, times: &[f64], settings: Settings) -> Vec<Scene> {
+    let nursery = Nursery::new(&session.model, settings);
     let draw = |&t: &f64| {
         let mut string = ModuleString::default();
-        let mut simulation = session.simulate(Settings::default()).expect("it starts");
+        let mut simulation = session.simulate(settings).expect("it starts");
         simulation.at(t, &mut string).unwrap_or_else(|error| panic!("{error}"));
         let mut scene = nursery.blank();
         nursery.draw(&string, &mut scene).unwrap_or_else(|error| panic!("{error}"));
@@ -107,6 +111,29 @@ fn divisions_cannot_be_seen_in_the_wind() {
         assert!(jump.position < 1e-9, "{jump:?}");
         assert!(jump.velocity < 1e-6 * jump.speed.max(1.0), "{jump:?}");
     }
+}
+
+/// Thin stems take many steps a tick, which read the turbulence between a few instants: within what a step tolerates of what they do with an instant for
+/// each, as with any smaller tolerance, where their steps are otherwise the same.
+#[test]
+fn short_steps_read_turbulence_between_instants() {
+    let text = "units length 0.02, time 1\n\
+        tissue thread = stiffness 1e8, density 900, damping 0.1\n\
+        wind 1, 0, 0.3 speed 3 + sin(2*t) turbulence 0.3 scale 1\n\
+        initial string: @E(thread) S(0.3) S(0.3) [ +(40) S(0.2) @L(0.5) ] S(0.2) @K(0.2)\n\
+        S(x): solve dx/dt = 0.5\n\
+        interpret S(x): !(0.01 + 0.01*x) F(x)\n";
+    let session = read("threads.dls", text);
+    let drawn = |tolerance: f64| {
+        let bending = BendSettings { tolerance, ..BendSettings::default() };
+        let scenes = scenes_with(&session, &[1.0], Settings { bending, ..Settings::default() });
+        points(&scenes[0])
+    };
+    let (between, exact) = (drawn(1e-3), drawn(0.999e-3));
+    let extent = exact.values().map(|point| point.coords.norm()).fold(0.0, f64::max);
+    let off = |(key, point): (&(u64, usize), &Point)| (point - exact[key]).norm() / extent;
+    let worst = between.iter().map(off).fold(0.0, f64::max);
+    assert!(worst > 1e-9 && worst < 1e-3, "{worst:e}");
 }
 
 #[test]

@@ -169,13 +169,16 @@ impl Builder<'_> {
         };
     }
 
-    /// Three constants that are a direction; `example` is the remedy if all are 0.
+    /// Three constants that are a direction; `example` is the remedy if all are 0. Squares of the result are numbers, however long or short it was.
     fn direction(&mut self, written: &[Expression], example: &str) -> Option<[f64; 3]> {
         let all = &self.document.expressions;
         let &[x, y, z] = written else { return None };
         let values = [x, y, z].map(|c| self.scope.constant_value(all, c));
         let [Some(x), Some(y), Some(z)] = values else { return None };
-        self.is_direction(&[x, y, z], written, example).then_some([x, y, z])
+        let largest = x.abs().max(y.abs()).max(z.abs());
+        let scale = if (1e-100..1e100).contains(&largest) { 1.0 } else { largest };
+        let is = self.is_direction(&[x, y, z], written, example);
+        is.then(|| [x, y, z].map(|part| part / scale))
     }
 
     /// Reports three values that are all 0; true if they are a direction.
@@ -190,6 +193,26 @@ impl Builder<'_> {
             );
         }
         is
+    }
+
+    /// The height of the ground.
+    pub(crate) fn height(&mut self, height: Expression) -> Option<f64> {
+        /// What drawings may reach, too.
+        const FURTHEST: f64 = 1e100;
+        let all = &self.document.expressions;
+        let value = self.scope.constant_value(all, height)?;
+        if value.abs() <= FURTHEST {
+            return Some(value);
+        }
+        self.scope.diagnostics.push(
+            Diagnostic::error("the ground is beyond the greatest coordinate")
+                .at(
+                    all.span(height.root),
+                    format!("it is {}, and coordinates go up to {FURTHEST:e}", shown(value)),
+                )
+                .help("the height of the ground is in units of the model: `ground 0` is where plants begin"),
+        );
+        None
     }
 
     pub(crate) fn wind(&mut self, direction: &[Expression; 3], attributes: &[Attribute], span: Span) {

@@ -67,7 +67,7 @@ pub(crate) fn build(
             }
             Item::Ground { height, color: of_floor } => {
                 builder.once("ground", *span);
-                builder.scenery.ground = builder.scope.constant_value(&document.expressions, *height);
+                builder.scenery.ground = builder.height(*height);
                 builder.scenery.ground_color = of_floor.as_ref().and_then(|text| color(text, builder.scope));
             }
             Item::Bed { soil, file, attributes, textures } => {

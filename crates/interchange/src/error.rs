@@ -64,6 +64,14 @@ pub enum Error {
         /// The largest that it may be.
         limit: f64,
     },
+    /// The same of the ground.
+    #[error("the ground is at a height of {metres:e} m, and places in the file go up to {limit:e} m")]
+    GroundTooFar {
+        /// The height in metres.
+        metres: f64,
+        /// The largest that it may be.
+        limit: f64,
+    },
     /// The caller stopped the work.
     #[error("stopped before t = {time}")]
     Stopped {

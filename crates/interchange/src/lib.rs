@@ -166,10 +166,13 @@ impl Options {
 
     /// Checks that places have 32 bit floats.
     fn check_extent(&self) -> Result<(), Error> {
-        let metres = self.extent * self.metres;
-        match metres > Options::WIDEST {
-            true => Err(Error::TooWide { metres, limit: Options::WIDEST }),
-            false => Ok(()),
+        let (metres, limit) = (self.extent * self.metres, Options::WIDEST);
+        if metres > limit {
+            return Err(Error::TooWide { metres, limit });
+        }
+        match self.floor.map(|[height, ..]| height * self.metres) {
+            Some(metres) if metres.abs() > limit => Err(Error::GroundTooFar { metres, limit }),
+            _ => Ok(()),
         }
     }
 

@@ -79,6 +79,9 @@ pub enum Error {
         /// The first frame that does not fit, from 0.
         frame: usize,
     },
+    /// More plants of other models are seen than a picture of vectors has room for.
+    #[error("{0}")]
+    TooManySeen(io::Error),
     /// The camera or the sky of a frame of an animated SVG is not that of the first one.
     #[error(
         "frame {frame} has another camera or sky than the first, and an animated SVG has one of each; choose a film of pixels, such as --format webp"

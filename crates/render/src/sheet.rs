@@ -74,26 +74,35 @@ impl SheetWriter {
     }
 
     /// Draws the frame with this number. A frame that the sheet has no place for is left out.
-    pub fn part(&self, index: usize, scene: &Scene) -> Part {
+    ///
+    /// # Errors
+    /// If more plants of other models are seen than a picture of vectors has room for.
+    pub fn part(&self, index: usize, scene: &Scene) -> Result<Part, Error> {
         let cell = self.sheet.cells.get(index);
         let fit = &*self.fit_of(cell);
         let scene = &*fit.drawn(Cow::Borrowed(scene));
-        Part(match self.format.content() {
+        Ok(Part(match self.format.content() {
             Content::Pixels => {
                 let (size, corner, placement) = self.window(cell);
                 Drawn::Image(png::picture(scene, fit, size, placement, Smoothness::Fine, 1), corner)
             }
-            _ => {
-                let style = svg::style(fit, &self.page);
-                let scene = scene.flattened();
-                let scene = &*scene.tessellated(fit.accuracy);
-                let (scene, floor) = floor::added(scene, fit, Some(&self.page_of(fit)));
-                let (scene, style) = (&*scene, painter::Style { floor, ..style });
-                Drawn::Elements(cell.map_or_else(String::new, |_| {
-                    painter::elements(scene, style, false, &format!("f{index}"))
-                }))
-            }
-        })
+            _ => Drawn::Elements(match cell {
+                None => String::new(),
+                Some(_) => self.elements(scene, fit, &format!("f{index}"))?,
+            }),
+        }))
+    }
+
+    fn elements(&self, scene: &Scene, fit: &Fit, prefix: &str) -> Result<String, Error> {
+        let style = svg::style(fit, &self.page);
+        if fit.has_visible_regions() && !scene.plants.is_empty() {
+            let style = painter::Style { casting: Some(scene), ..style };
+            return svg::field(scene, &self.alone(fit), style, (false, prefix)).map_err(Error::TooManySeen);
+        }
+        let scene = scene.flattened();
+        let scene = &*scene.tessellated(fit.accuracy);
+        let (scene, floor) = floor::added(scene, fit, Some(&self.page_of(fit)));
+        Ok(painter::elements(&scene, painter::Style { floor, ..style }, false, prefix))
     }
 
     /// The fit of a frame: of one that stands on the floor of the sheet, its part of that.
@@ -107,11 +116,13 @@ impl SheetWriter {
         }
     }
 
-    /// The page of a frame alone.
+    /// The page for the floor of a frame.
     fn page_of(&self, fit: &Fit) -> Page {
-        if fit.shaded.is_none() {
-            return self.page;
-        }
+        if fit.shaded.is_none() { self.page } else { self.alone(fit) }
+    }
+
+    /// The page of a frame alone, at the scale of the sheet.
+    fn alone(&self, fit: &Fit) -> Page {
         let [_, _, width, height] = fit.picture.area;
         let pixels = [width, height].map(|side| (side * self.page.pixels_per_unit()).ceil().max(1.0) as u32);
         Page { picture: fit.picture, pixels, ..self.page }

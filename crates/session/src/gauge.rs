@@ -7,10 +7,11 @@
 //!
 //! The sample is taken from the scene at the end of the frames that the model declares, the camera is looked through over all of them, and
 //! plants are solved where there is no camera. So the choice depends on the model and on the size of the picture; it does not depend on the
-//! times that are drawn, on their order and on threads.
+//! times that are drawn, on their order and on threads. Distances only grow while the sample is followed, so this ends as soon as every plant that
+//! was asked for is known to be solved, and goes on for one that is smaller in the picture.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use dlsys_geometry::scene::{Point, Scene, Seedling, Viewpoint};
 use dlsys_geometry::turtle;
@@ -57,33 +58,39 @@ pub(crate) struct Choice {
     pub pixels: f64,
 }
 
-/// What was measured.
-#[derive(Debug)]
-pub(crate) struct Gauge {
+/// What is measured.
+pub(crate) struct Gauge<'m> {
     detail: Detail,
     cameras: Vec<Viewpoint>,
     /// By the number of the declaration.
-    kinds: Vec<Option<Kind>>,
+    kinds: Vec<Option<Mutex<Kind<'m>>>>,
 }
 
-/// A declaration `plant`. Lengths are in units of the scene.
-#[derive(Debug)]
-struct Kind {
-    /// Largest distance of any point of a sample from its root.
+/// A declaration `plant`, as far as its sample has been followed.
+struct Kind<'m> {
+    /// The sample: each plant solved, and by each number of modes. None when it has been followed to its end.
+    runs: Vec<(Motion<'m>, Vec<Motion<'m>>)>,
+    /// The first instant of the sample, and the last one of the frames, in s; the metres of a unit of the scene.
+    span: [f64; 2],
+    metre: f64,
+    ticks: u64,
+    /// Largest distance of any point of a sample from its root, in m.
     reach: f64,
-    /// Largest distance between the solved motion and that by modes, for each number of them.
+    /// Largest distance between the solved motion and that by modes, for each number of them, in m.
     errors: [f64; LADDER.len()],
+    /// No plant of it ever stands, or one cannot be followed.
+    is_lost: bool,
 }
 
-impl Gauge {
-    /// Measures the plants of a scene; `None` if it has no camera, or no plants that are worth it.
-    pub(crate) fn new<'m>(
+impl<'m> Gauge<'m> {
+    /// The plants of a scene; `None` if it has no camera, or no plants that are worth it.
+    pub(crate) fn new(
         (model, settings): (&'m Model, Settings),
         blank: &Scene,
         around: &Around<'m>,
         detail: Detail,
         classes: &Arc<Classes>,
-    ) -> Option<Gauge> {
+    ) -> Option<Gauge<'m>> {
         let cameras = cameras(model, detail)?;
         let end = model.frames.map_or(0.0, |frames| frames.to);
         let settings = Settings { log: false, ..settings };
@@ -96,18 +103,30 @@ impl Gauge {
             if all.len() < FEWEST || !sways(&model.scenery.plants[plant].model) {
                 return None;
             }
-            kind(model, settings, around, (&chosen(all), end), classes)
+            kind(model, settings, around, (&chosen(all), end), classes).map(Mutex::new)
         });
-        let kinds: Vec<Option<Kind>> = kinds.collect();
+        let kinds: Vec<Option<Mutex<Kind<'m>>>> = kinds.collect();
         kinds.iter().any(Option::is_some).then_some(Gauge { detail, cameras, kinds })
     }
 
     /// How a plant of a declaration moves at a place in the scene; `None` if it is solved.
     pub(crate) fn choose(&self, plant: usize, at: Point) -> Option<Choice> {
-        let kind = self.kinds.get(plant)?.as_ref()?;
-        let scales = self.cameras.iter().map(|camera| scale(camera, at, kind.reach));
+        let mut kind = self.kinds.get(plant)?.as_ref()?.lock().unwrap_or_else(PoisonError::into_inner);
+        loop {
+            let choice = self.fewest(&kind, at).filter(|_| !kind.is_lost)?;
+            if kind.runs.is_empty() {
+                return Some(choice);
+            }
+            kind.go_on();
+        }
+    }
+
+    /// The fewest modes with an error under the bound, by what is known so far.
+    fn fewest(&self, kind: &Kind<'m>, at: Point) -> Option<Choice> {
+        let (reach, metre) = (kind.reach / kind.metre, kind.metre);
+        let scales = self.cameras.iter().map(|camera| scale(camera, at, reach));
         let scale = self.detail.pixels * scales.fold(0.0, f64::max);
-        let of = |(&count, &error): (&usize, &f64)| Choice { count, pixels: error * scale };
+        let of = |(&count, &error): (&usize, &f64)| Choice { count, pixels: error / metre * scale };
         LADDER.iter().zip(&kind.errors).map(of).find(|choice| choice.pixels <= PART * self.detail.bound)
     }
 }
@@ -154,14 +173,14 @@ fn chosen(mut all: Vec<&Seedling>) -> Vec<&Seedling> {
     all
 }
 
-/// Measures a sample of one declaration from t = 0 to the end; `None` if no plant of it ever stands, or one fails.
+/// A sample of one declaration from t = 0 to the end, before it is followed; `None` if there is none.
 fn kind<'m>(
     model: &'m Model,
     settings: Settings,
     around: &Around<'m>,
     (sample, end): (&[&Seedling], f64),
     classes: &Arc<Classes>,
-) -> Option<Kind> {
+) -> Option<Kind<'m>> {
     let first = sample.first()?;
     let place = around.within(first, &model.scenery.plants[first.plant].model).place;
     let (metre, second) = (place.units.length, around.place.units.time);
@@ -178,22 +197,36 @@ fn kind<'m>(
         let all: Option<Vec<Motion<'_>>> = LADDER.into_iter().map(by).collect();
         runs.push((motion(seedling, None)?, all?));
     }
-    let (mut errors, mut reach, mut ticks) = ([0.0_f64; LADDER.len()], 0.0_f64, 0);
     let first = runs.iter().map(|(solved, _)| solved.reached()).fold(f64::INFINITY, f64::min);
     let last = if end > 0.0 { around.place.birth + end * second } else { f64::INFINITY };
-    while ticks < MOST_TICKS[0] {
-        ticks += 1;
-        let now = first + (ticks as f64 + 0.5) * CLOCK;
+    let errors = [0.0; LADDER.len()];
+    Some(Kind { runs, span: [first, last], metre, ticks: 0, reach: 0.0, errors, is_lost: false })
+}
+
+impl Kind<'_> {
+    /// Follows the sample for a tick, or ends it.
+    fn go_on(&mut self) {
         let by_modes = |motions: &[Motion<'_>]| motions[0].effort().by_modes;
-        if now > last || runs.iter().all(|(_, motions)| by_modes(motions) >= MOST_TICKS[1]) {
-            break;
+        let [first, last] = self.span;
+        let now = first + ((self.ticks + 1) as f64 + 0.5) * CLOCK;
+        let is_over = self.ticks >= MOST_TICKS[0]
+            || now > last
+            || self.runs.iter().all(|(_, motions)| by_modes(motions) >= MOST_TICKS[1]);
+        if is_over {
+            self.is_lost = self.runs.iter().all(|(_, motions)| by_modes(motions) == 0);
+            self.runs.clear();
+            return;
         }
+        self.ticks += 1;
         // All in turn, so that they share the instants of the wind.
-        for (solved, motions) in &runs {
-            solved.advance(now).ok()?;
+        for (solved, motions) in &self.runs {
+            if solved.advance(now).is_err() {
+                self.is_lost = true;
+                return;
+            }
             let points = solved.points();
-            reach = points.iter().map(|point| point.norm()).fold(reach, f64::max);
-            for (motion, error) in motions.iter().zip(&mut errors) {
+            self.reach = points.iter().map(|point| point.norm()).fold(self.reach, f64::max);
+            for (motion, error) in motions.iter().zip(&mut self.errors) {
                 if motion.advance(now).is_err() {
                     *error = f64::INFINITY;
                     continue;
@@ -205,7 +238,4 @@ fn kind<'m>(
             }
         }
     }
-    let stands = runs.iter().any(|(_, motions)| motions[0].effort().by_modes > 0);
-    let errors = errors.map(|error| error / metre);
-    stands.then_some(Kind { reach: reach / metre, errors })
 }

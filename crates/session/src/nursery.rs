@@ -96,7 +96,7 @@ pub struct Nursery<'m> {
     swaying: Swaying<'m>,
     /// The size of the picture, if there is one, and what it means for the plants in the wind.
     detail: Option<Detail>,
-    gauge: OnceLock<Option<Gauge>>,
+    gauge: OnceLock<Option<Gauge<'m>>>,
     /// Threads for the plants of one scene.
     threads: usize,
     has_gases: bool,

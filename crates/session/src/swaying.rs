@@ -113,7 +113,7 @@ impl<'m> Swaying<'m> {
         &self,
         around: &Around<'m>,
         plants: &[(&Seedling, &'m Model, u64)],
-        (settings, gauge): (Settings, Option<&Gauge>),
+        (settings, gauge): (Settings, Option<&Gauge<'m>>),
         now: f64,
     ) -> Result<Vec<Option<Arc<Motion<'m>>>>, (usize, Error)> {
         let mut motions = Vec::with_capacity(plants.len());

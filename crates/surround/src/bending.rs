@@ -14,12 +14,13 @@ use dlsys_model::Model;
 use dlsys_sway::{self as sway, Solver, State, Vector, Wind, hermite};
 use dlsys_tree::ModuleString;
 
+use crate::between;
 use crate::body::{Body, kept, roll, rolled};
 use crate::classes::{ByModes, Modal};
 use crate::descent::Descent;
 use crate::flights::Flown;
 use crate::place::Place;
-use crate::weather::Sampler;
+use crate::sampler::{Breeze, Sampler};
 use crate::{CLOCK, Error, FailedStem};
 
 /// The strains of all stems at an instant within a tick.
@@ -352,7 +353,10 @@ impl<'w, M: Deref<Target = Model>> Bending<'w, M> {
             true
         };
         let mut note = |step: &sway::Step<'_>| knots.push(Knot::new(step.to, step.after));
-        let done = self.solver.advance(state, from, to, &mut growth, &*self.wind, &mut note);
+        let done = match between::serves(self.tolerance, body.stems.len()) {
+            true => self.solver.advance(state, from, to, &mut growth, &Breeze(&self.wind), &mut note),
+            false => self.solver.advance(state, from, to, &mut growth, &*self.wind, &mut note),
+        };
         done.map_err(|error| self.wind.failure().unwrap_or_else(|| self.failure(body, error, from)))?;
         let steps = knots.len() as u64 - 1;
         (self.effort.steps, self.effort.stem_steps) =

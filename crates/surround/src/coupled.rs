@@ -19,7 +19,8 @@ use crate::motion::Passive;
 use crate::place::Place;
 use crate::pushed;
 use crate::reading;
-use crate::weather::{Sampler, Weather};
+use crate::sampler::Sampler;
+use crate::weather::Weather;
 use crate::{CLOCK, Error};
 
 /// Starts a simulation of a model, in the surroundings that its rules read, if they read any.

@@ -22,7 +22,7 @@ use crate::descent::Descent;
 use crate::loose::{Loose, stand};
 use crate::place::Place;
 use crate::points::{Pair, rigid_motion};
-use crate::weather::{Gusts, Sampler};
+use crate::sampler::{Gusts, Sampler};
 
 /// Most parts that one model may let go.
 const MOST_PARTS: usize = 100_000;

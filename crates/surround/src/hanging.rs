@@ -29,8 +29,8 @@ use crate::line::{Exerted, Line};
 use crate::mire::Mire;
 use crate::paths::{INSTANTS, Meets, Path, Watch};
 use crate::place::Place;
+use crate::sampler::{Gusts, Sampler};
 use crate::tracks::{Hung, Part, Passage, Tick, Track};
-use crate::weather::{Gusts, Sampler};
 use crate::{Error, MOST_SHEET_POINTS};
 
 /// Seconds from one tick of the sheets to the next. A power of 2, so that its multiples are exact.

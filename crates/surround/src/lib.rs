@@ -24,6 +24,7 @@
 mod advice;
 mod afloat;
 mod bending;
+mod between;
 mod body;
 mod classes;
 mod columns;
@@ -54,6 +55,7 @@ mod pressing;
 mod pushed;
 mod quilt;
 mod reading;
+mod sampler;
 mod sheets;
 mod solids;
 mod spray;
@@ -78,11 +80,12 @@ pub use picture::Earth;
 pub use place::Place;
 pub use quilt::Quilt;
 pub use reading::bind;
+pub use sampler::Sampler;
 pub use sheets::Sheets;
 pub use survey::{Axis, Survey, Vibration, moves};
 pub use terrain::{TICKS as GROUND_TICKS, Terrain, TerrainReport};
 pub use trial::{SheetSeen, SolidSeen, Trial, TrialTick, Ways};
-pub use weather::{Sampler, Weather};
+pub use weather::Weather;
 
 /// Most points of all sheets of a scene.
 pub const MOST_SHEET_POINTS: usize = 1_000_000;

@@ -24,7 +24,8 @@ use crate::course::{Course, Past};
 use crate::flights::Flights;
 use crate::marks::{Marks, Recent};
 use crate::place::Place;
-use crate::weather::{Sampler, Weather};
+use crate::sampler::Sampler;
+use crate::weather::Weather;
 use crate::{CLOCK, Error};
 
 /// Most ticks up to a time that is asked for.

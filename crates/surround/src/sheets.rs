@@ -19,8 +19,9 @@ use crate::marks::{Marks, Recent};
 use crate::mire::Mire;
 use crate::motion::MOST_TICKS;
 use crate::place::Place;
+use crate::sampler::Sampler;
 use crate::tracks::Tick;
-use crate::weather::{Sampler, Weather};
+use crate::weather::Weather;
 
 /// Most points of the ticks that are kept for times that come a little late, and of marks.
 const MOST_KEPT: usize = 2_000_000;

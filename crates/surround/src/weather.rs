@@ -8,16 +8,16 @@ use dlsys_expr::Program;
 use dlsys_geometry::turtle;
 use dlsys_model::{self as model, Model, Primitive, Scenery, Units};
 use dlsys_sim::Settings;
-use dlsys_sway as sway;
 use dlsys_wind::{
     self as wind, Description, Field, Flow, Ground, Hull, Obstacle, Signal, Snapshot, Spectrum,
 };
 use nalgebra::Vector3;
 
+use crate::Error;
+use crate::between;
 use crate::footing::{Among, Footing};
 use crate::obstacles::Obstacles;
 use crate::solids::Solids;
-use crate::{Error, Place};
 
 /// The wind of a scene, with its bodies: a pure function of place and time.
 pub struct Weather<'m> {
@@ -29,6 +29,8 @@ pub struct Weather<'m> {
     footing: Option<Arc<Footing<'m>>>,
     /// The last instants with bodies.
     recent: Recent,
+    /// The same of those between instants.
+    between: Recent,
 }
 
 /// The wind that a model declares, without bodies. Runs of one model share it.
@@ -36,6 +38,8 @@ pub struct Weather<'m> {
 struct Declared {
     field: Arc<Field>,
     recent: Recent,
+    /// The last tick, with the parts that it is divided into.
+    parts: Mutex<Option<(f64, Option<u32>)>>,
     spans: Spans,
 }
 
@@ -107,7 +111,10 @@ impl Declared {
         description.ground = ground.map(|height| Ground::Flat(height * units.length));
         let spans = Spans { wind: span, flows: flows.iter().map(|flow| flow.span).collect() };
         match Field::new(description) {
-            Ok(field) => Ok(Arc::new(Declared { field: Arc::new(field), recent: Recent::default(), spans })),
+            Ok(field) => {
+                let (field, recent, parts) = (Arc::new(field), Recent::default(), Mutex::default());
+                Ok(Arc::new(Declared { field, recent, parts, spans }))
+            }
             Err(error) => Err(spans.locate(error)),
         }
     }
@@ -116,9 +123,43 @@ impl Declared {
         let make = || self.field.at(time).map(Arc::new);
         self.recent.get_or_make(time, make).map_err(|error| self.spans.locate(error))
     }
+
+    /// The same at the times of short steps, in s, with turbulence between instants.
+    fn between(&self, time: f64) -> Result<Arc<Snapshot>, Error> {
+        let around = self.parts(between::tick_of(time))?.and_then(|parts| between::around(time, parts));
+        let Some(around) = around else { return self.at(time) };
+        let [a, b, c, d] = around.times.map(|time| self.at(time));
+        let (a, b, c, d) = (a?, b?, c?, d?);
+        match self.field.between(time, [&a, &b, &c, &d], around.place) {
+            Ok(Some(snapshot)) => Ok(Arc::new(snapshot)),
+            Ok(None) => self.at(time),
+            Err(error) => Err(self.spans.locate(error)),
+        }
+    }
+
+    /// The parts of a tick between which turbulence is interpolated, as a power of two.
+    fn parts(&self, tick: f64) -> Result<Option<u32>, Error> {
+        let last = || self.parts.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, parts)) = last().filter(|(of, _)| *of == tick) {
+            return Ok(parts);
+        }
+        let parts = between::parts(&self.field, tick).map_err(|error| self.spans.locate(error))?;
+        *last() = Some((tick, parts));
+        Ok(parts)
+    }
 }
 
 impl<'m> Weather<'m> {
+    fn new(
+        declared: Arc<Declared>,
+        solids: Option<Arc<Solids<'m>>>,
+        obstacles: Option<Arc<Obstacles<'m>>>,
+        footing: Option<Arc<Footing<'m>>>,
+    ) -> Weather<'m> {
+        let (recent, between) = (Recent::default(), Recent::default());
+        Weather { declared, solids, obstacles, footing, recent, between }
+    }
+
     /// The wind and the flows that a model declares, pushed aside by its bodies as they move in a run with these settings; `None` if it
     /// declares none of them, and no soil on which something may land.
     ///
@@ -130,7 +171,7 @@ impl<'m> Weather<'m> {
         let solids = Solids::new(model, settings)?.map(Arc::new);
         let obstacles = Obstacles::new(model, settings).map(Arc::new);
         let footing = Footing::new(model, settings).map(Arc::new);
-        Ok(Some(Arc::new(Weather { declared, solids, obstacles, footing, recent: Recent::default() })))
+        Ok(Some(Arc::new(Weather::new(declared, solids, obstacles, footing))))
     }
 
     /// The wind and the flows that a model declares, whatever bodies it has; `None` if it declares neither.
@@ -142,11 +183,7 @@ impl<'m> Weather<'m> {
             return Ok(None);
         }
         let declared = Declared::of(scenery, None)?;
-        let weather = |declared| {
-            let (obstacles, footing) = (None, None);
-            Arc::new(Weather { declared, solids: None, obstacles, footing, recent: Recent::default() })
-        };
-        Ok(declared.map(weather))
+        Ok(declared.map(|declared| Arc::new(Weather::new(declared, None, None, None))))
     }
 
     /// The wind of a model whose rules read `strain`, which has no bodies.
@@ -155,11 +192,7 @@ impl<'m> Weather<'m> {
             return Err(Error::SolidInLoop { span: *span });
         }
         let declared = Declared::of(scenery, None)?;
-        let weather = |declared| {
-            let (obstacles, footing) = (None, None);
-            Arc::new(Weather { declared, solids: None, obstacles, footing, recent: Recent::default() })
-        };
-        Ok(declared.map(weather))
+        Ok(declared.map(|declared| Arc::new(Weather::new(declared, None, None, None))))
     }
 
     /// The same wind as a cloud of a size feels it, around the same bodies: turbulence averaged over a Gaussian of this standard deviation in m.
@@ -173,7 +206,7 @@ impl<'m> Weather<'m> {
         };
         let (solids, obstacles, footing) =
             (self.solids.clone(), self.obstacles.clone(), self.footing.clone());
-        Ok(Weather { declared, solids, obstacles, footing, recent: Recent::default() })
+        Ok(Weather::new(declared, solids, obstacles, footing))
     }
 
     /// The field without bodies.
@@ -202,6 +235,11 @@ impl<'m> Weather<'m> {
         self.solids.as_ref().map_or(Ok(Vec::new()), |solids| solids.hulls(time))
     }
 
+    /// What is in the way of what falls.
+    pub(crate) fn in_the_way(&self) -> Among<'_, 'm> {
+        Among { obstacles: self.obstacles.as_deref(), footing: self.footing.as_deref() }
+    }
+
     /// True if there may be bodies.
     pub(crate) fn has_bodies(&self) -> bool {
         self.solids.is_some()
@@ -222,7 +260,19 @@ impl<'m> Weather<'m> {
     /// A value of the wind that is not finite at that time; the growth of the bodies up to that time fails, or one of them cannot push
     /// the wind.
     pub fn at(&self, time: f64) -> Result<Arc<Snapshot>, Error> {
-        let free = self.declared.at(time)?;
+        self.with_bodies(time, self.declared.at(time)?, &self.recent)
+    }
+
+    /// The wind at a time of a step of stems, in s: at times that are close together with turbulence as it is between instants, with an error of some
+    /// 1 %, see `between.rs`. All else is that of the time itself.
+    ///
+    /// # Errors
+    /// As of [`Weather::at`].
+    pub fn between(&self, time: f64) -> Result<Arc<Snapshot>, Error> {
+        self.with_bodies(time, self.declared.between(time)?, &self.between)
+    }
+
+    fn with_bodies(&self, time: f64, free: Arc<Snapshot>, recent: &Recent) -> Result<Arc<Snapshot>, Error> {
         let Some(solids) = &self.solids else { return Ok(free) };
         let make = || {
             let bodies = solids.at(time)?;
@@ -231,7 +281,7 @@ impl<'m> Weather<'m> {
             }
             free.among(&bodies).map(Arc::new).map_err(|error| self.declared.spans.locate(error))
         };
-        self.recent.get_or_make(time, make)
+        recent.get_or_make(time, make)
     }
 }
 
@@ -290,91 +340,54 @@ fn of_flow(flow: &model::Flow, units: Units) -> Flow {
 /// Radius of the core of sources and vortices, in m.
 const CORE: f64 = 0.1;
 
-/// The wind at a place, for a solver that asks for a few instants many times.
-pub struct Sampler<'m> {
-    weather: Option<Arc<Weather<'m>>>,
-    /// The last instant.
-    last: Mutex<Option<(f64, Arc<Snapshot>)>>,
-    /// The reason why the wind had no value at an instant.
-    failure: Mutex<Option<Error>>,
-    place: Place,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::CLOCK;
+    use crate::between::around;
 
-impl<'m> Sampler<'m> {
-    /// The wind for a model at a place; without weather the air is still.
-    pub fn new(weather: Option<Arc<Weather<'m>>>, place: Place) -> Sampler<'m> {
-        Sampler { weather, last: Mutex::default(), failure: Mutex::default(), place }
+    fn declared(turbulence: f64) -> Declared {
+        let description = Description { turbulence, seed: 3, ..Description::new(Vector3::x(), 3.0) };
+        let spans = Spans { wind: Span::default(), flows: Vec::new() };
+        let field = Arc::new(Field::new(description).expect("a wind"));
+        Declared { field, recent: Recent::default(), parts: Mutex::default(), spans }
     }
 
-    /// What is in the way of what falls.
-    pub(crate) fn in_the_way(&self) -> Among<'_, 'm> {
-        let weather = self.weather.as_ref();
-        let obstacles = weather.and_then(|weather| weather.obstacles.as_deref());
-        Among { obstacles, footing: weather.and_then(|weather| weather.footing.as_deref()) }
-    }
-
-    /// True if the air moves somewhere at some time.
-    pub fn blows(&self) -> bool {
-        self.weather.is_some()
-    }
-
-    /// The reason why the wind had no value, if there was an instant without one: its velocities are not numbers then, and a solver
-    /// that depends on them fails.
-    pub(crate) fn failure(&self) -> Option<Error> {
-        self.failure.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
-    /// The wind at an instant, in s; `None` without weather, or if it has no value.
-    fn at(&self, time: f64) -> Option<Arc<Snapshot>> {
-        let weather = self.weather.as_ref()?;
-        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((at, known)) = &*last
-            && *at == time
-        {
-            return Some(known.clone());
-        }
-        let new = match weather.at(time) {
-            Ok(new) => new,
-            Err(error) => {
-                *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-                return None;
+    /// However many steps a tick has, it makes the instants that its turbulence asks for; steps that meet them read these, to the last bit.
+    #[test]
+    fn a_tick_of_short_steps_makes_few_instants() {
+        const STEPS: u32 = 256;
+        let declared = declared(0.3);
+        let x = Vector3::new(0.3, 1.2, -0.7);
+        let (mut error, mut square, mut met) = (0.0, 0.0, 0);
+        for step in 0..=STEPS {
+            let time = CLOCK * (7.0 + f64::from(step) / f64::from(STEPS));
+            let found = declared.between(time).expect("a wind").velocity(x);
+            let exact = declared.field.at(time).expect("a wind").velocity(x);
+            error += (found - exact).norm_squared();
+            square += (exact - Vector3::x() * 3.0).norm_squared();
+            let parts = declared.parts(7.0).expect("a speed").expect("turbulence");
+            if around(time, parts).is_none() {
+                assert_eq!(found, exact);
+                met += 1;
             }
-        };
-        *last = Some((time, new.clone()));
-        Some(new)
-    }
-}
-
-/// The wind in the axes of the scene at instants of a grid, and between them by straight lines: for bodies that fall, each in steps of its own.
-/// Turbulence changes little from one instant to the next, and many bodies read the same ones.
-pub(crate) struct Gusts<'a, 'm>(pub(crate) &'a Sampler<'m>);
-
-/// Instants in a second. Steps of a flight end at parts of a second that are powers of 2, and the longest ones read the wind at these.
-const INSTANTS: f64 = 128.0;
-
-impl sway::Wind for Gusts<'_, '_> {
-    fn velocity(&self, point: sway::Vector, time: f64) -> sway::Vector {
-        let Gusts(sampler) = self;
-        if !sampler.blows() {
-            return sway::Vector::zeros();
         }
-        let at = |instant: f64| match sampler.at(instant / INSTANTS) {
-            Some(snapshot) => snapshot.velocity(point),
-            None => sway::Vector::repeat(f64::NAN),
-        };
-        let instant = (time * INSTANTS).floor();
-        let part = time * INSTANTS - instant;
-        let before = at(instant);
-        if part == 0.0 { before } else { before.lerp(&at(instant + 1.0), part) }
+        let instants = declared.recent.0.lock().expect("nobody has it").len();
+        assert!(met >= 5 && instants <= met + 3, "{instants} instants for {STEPS} steps, {met} met");
+        let relative = (error / square).sqrt();
+        assert!(relative < 0.02, "{relative}");
     }
-}
 
-impl sway::Wind for Sampler<'_> {
-    fn velocity(&self, point: sway::Vector, time: f64) -> sway::Vector {
-        match self.at(time) {
-            Some(snapshot) => self.place.turn.transpose() * snapshot.velocity(self.place.point(point)),
-            None if self.blows() => sway::Vector::repeat(f64::NAN),
-            None => sway::Vector::zeros(),
+    /// In any order.
+    #[test]
+    fn wind_between_instants_is_a_function_of_time() {
+        let times: Vec<f64> = (0..60).map(|i| 0.4 + f64::from(i * 17 % 60) * 0.0013).collect();
+        let x = Vector3::new(0.3, 1.2, -0.7);
+        let read = |declared: &Declared, time: f64| declared.between(time).expect("a wind").velocity(x);
+        let one = declared(0.3);
+        let all: Vec<_> = times.iter().map(|time| read(&one, *time)).collect();
+        for (time, known) in times.iter().zip(all).rev() {
+            assert_eq!(read(&declared(0.3), *time), known);
         }
     }
 }

@@ -127,12 +127,20 @@ impl Description {
         }
     }
 
+    /// The direction as a vector of length 1, however long or short it is.
+    pub(crate) fn heading(&self) -> Result<Vector3<f64>, Error> {
+        let (direction, largest) = (self.direction, self.direction.amax());
+        if !(direction.iter().all(|part| part.is_finite()) && largest > 0.0) {
+            return Err(Error::Direction(direction.into()));
+        }
+        // Squares of others are too small or too large for numbers.
+        let is_common = (1e-100..1e100).contains(&largest);
+        Ok(if is_common { direction.normalize() } else { (direction / largest).normalize() })
+    }
+
     /// All that can be said about the values without an instant.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let length = self.direction.norm();
-        if !(length.is_finite() && length > 0.0) {
-            return Err(Error::Direction(self.direction.into()));
-        }
+        self.heading()?;
         if let Signal::Constant(_) = self.speed {
             self.speed.finite_at(0.0, || "the speed of the wind".to_owned())?;
         }

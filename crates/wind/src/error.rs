@@ -6,7 +6,7 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum Error {
     /// The direction is zero or not finite.
-    #[error("the direction of the wind is ({}, {}, {}), which is no direction: one component at least must differ from 0, and all must be finite", .0[0], .0[1], .0[2])]
+    #[error("the direction of the wind is ({}), which is no direction: one component at least must differ from 0, and all must be finite", .0.map(shown).join(", "))]
     Direction([f64; 3]),
     /// The axis of a vortex is zero at an instant. Flows are counted from 1.
     #[error("the axis of flow {flow} is (0, 0, 0) at {time} s, which is no direction")]
@@ -81,4 +81,13 @@ pub enum Error {
         /// The largest distance from 0 in seconds.
         limit: f64,
     },
+}
+
+/// A number in a message; very large and very small ones with an exponent.
+fn shown(value: f64) -> String {
+    match value.abs() {
+        0.0 | 1e-4..1e6 => value.to_string(),
+        _ if value.is_finite() => format!("{value:e}"),
+        _ => value.to_string(),
+    }
 }

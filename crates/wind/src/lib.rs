@@ -48,6 +48,7 @@
 #![warn(missing_docs)]
 
 mod air;
+mod between;
 mod bodies;
 mod description;
 mod eddies;

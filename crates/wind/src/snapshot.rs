@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::between::Turbulence;
 use crate::bodies::Body;
 use crate::description::positive;
 use crate::eddies::Extremes;
@@ -23,13 +24,24 @@ use crate::primitives::Primitive;
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     time: f64,
-    lattices: Arc<[Lattice]>,
+    turbulence: Turbulence,
+    /// By the mean wind.
+    pub(crate) carried: Carried,
     mean: Mean,
     flows: Vec<Primitive>,
     bodies: Vec<Body>,
     setting: Arc<Setting>,
     /// It goes on below the ground.
     is_continued: bool,
+}
+
+/// What the turbulence of an instant has of the mean wind.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Carried {
+    /// How far that has come since t = 0, in m.
+    pub(crate) drift: f64,
+    /// The factor of the velocities of the bands.
+    pub(crate) amplitude: f64,
 }
 
 /// The mean wind at an instant.
@@ -86,13 +98,13 @@ pub(crate) struct Stream {
 impl Snapshot {
     pub(crate) fn new(
         time: f64,
-        lattices: Vec<Lattice>,
+        (turbulence, carried): (Turbulence, Carried),
         mean: Mean,
         flows: Vec<Primitive>,
         setting: Arc<Setting>,
     ) -> Result<Snapshot, Error> {
-        let (lattices, bodies) = (lattices.into(), Vec::new());
-        let snapshot = Snapshot { time, lattices, mean, flows, bodies, setting, is_continued: false };
+        let (bodies, is_continued) = (Vec::new(), false);
+        let snapshot = Snapshot { time, turbulence, carried, mean, flows, bodies, setting, is_continued };
         let setting = Arc::clone(&snapshot.setting);
         snapshot.among(&setting.obstacles)
     }
@@ -100,8 +112,9 @@ impl Snapshot {
     /// Lattices without a mean wind, flows and bodies, which go on below the ground.
     pub(crate) fn of_turbulence(time: f64, lattices: Vec<Lattice>, setting: Arc<Setting>) -> Snapshot {
         let mean = Mean::new(Vector3::zeros(), None);
-        let (lattices, flows, bodies) = (lattices.into(), Vec::new(), Vec::new());
-        Snapshot { time, lattices, mean, flows, bodies, setting, is_continued: true }
+        let (turbulence, carried) = (Turbulence::At(lattices.into()), Carried::default());
+        let (flows, bodies) = (Vec::new(), Vec::new());
+        Snapshot { time, turbulence, carried, mean, flows, bodies, setting, is_continued: true }
     }
 
     /// The same wind with further bodies in it, as they are at this instant. The wind at the centre of each is that without any body.
@@ -133,7 +146,25 @@ impl Snapshot {
 
     /// The same with the first lattices only. The wind at the centres of bodies is that of all.
     pub(crate) fn with_lattices(&self, count: usize) -> Snapshot {
-        Snapshot { lattices: self.lattices.iter().take(count).cloned().collect(), ..self.clone() }
+        Snapshot { turbulence: self.turbulence.first(count), ..self.clone() }
+    }
+
+    /// The lattices of the turbulence, or those of an instant near it.
+    pub(crate) fn lattices(&self) -> &[Lattice] {
+        self.turbulence.lattices()
+    }
+
+    /// The bands of the turbulence, with the thickness of the layer in which each turns aside over the ground.
+    fn layers(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.setting.layers.iter().copied().take(self.lattices().len()).enumerate()
+    }
+
+    /// The turbulence, if it is that of this instant.
+    pub(crate) fn exact(&self) -> Option<&Arc<[Lattice]>> {
+        match &self.turbulence {
+            Turbulence::At(lattices) => Some(lattices),
+            Turbulence::Between(_) => None,
+        }
     }
 
     /// The level of a place over the ground; without ground, that over y = 0.
@@ -154,8 +185,8 @@ impl Snapshot {
     /// spacing, along an axis of the lattice, and √3 times that along any direction.
     pub(crate) fn extremes(&self, before: Option<&Snapshot>) -> Extremes {
         let mut sum = [0.0; 3];
-        for (i, (lattice, layer)) in self.lattices.iter().zip(self.setting.layers).enumerate() {
-            let [speed, potential] = lattice.extremes(before.and_then(|before| before.lattices.get(i)));
+        for (i, (lattice, layer)) in self.lattices().iter().zip(self.setting.layers).enumerate() {
+            let [speed, potential] = lattice.extremes(before.and_then(|before| before.lattices().get(i)));
             let finer = 2.0 * f64::sqrt(3.0) / lattice.spacing();
             let [slope, bend] = [speed * finer, speed * finer * finer];
             let mut of = [speed, slope, bend];
@@ -210,13 +241,13 @@ impl Snapshot {
         }
         let flat = Vector3::new(x.x, level.eta, x.z);
         let mut curled = Vector3::zeros();
-        for (lattice, layer) in self.lattices.iter().zip(self.setting.layers) {
+        for (band, layer) in self.layers() {
             let [value, slope, _] = self.ground_ramp(level.eta, layer);
             if value == 1.0 {
-                curled += lattice.velocity(flat);
+                curled += self.turbulence.velocity(band, flat);
                 continue;
             }
-            let (a, first) = lattice.potential(flat);
+            let (a, first) = self.turbulence.potential(band, flat);
             curled += curl(&ramped(&first, a, value, slope));
         }
         let (horizontal, vertical) = self.mean.parts(level.eta);
@@ -254,9 +285,9 @@ impl Snapshot {
 
     fn potential_over_flat(&self, x: Vector3<f64>, height: f64) -> (Vector3<f64>, Matrix3<f64>) {
         let (mut value, mut first) = (Vector3::zeros(), Matrix3::zeros());
-        for (lattice, layer) in self.lattices.iter().zip(self.setting.layers) {
+        for (band, layer) in self.layers() {
             let [share, slope, _] = self.ground_ramp(height, layer);
-            let (a, derivatives) = lattice.potential(x);
+            let (a, derivatives) = self.turbulence.potential(band, x);
             value += Vector3::new(a.x * share, a.y, a.z * share);
             first += ramped(&derivatives, a, share, slope);
         }
@@ -286,7 +317,7 @@ impl Snapshot {
 
     /// The step of central differences in metres.
     fn step(&self) -> f64 {
-        let smallest = self.lattices.last().map_or(self.setting.layer, Lattice::spacing);
+        let smallest = self.lattices().last().map_or(self.setting.layer, Lattice::spacing);
         1e-4 * self.bodies.iter().map(|body| body.layer).fold(smallest, f64::min)
     }
 
@@ -298,8 +329,8 @@ impl Snapshot {
         }
         let flat = Vector3::new(x.x, height, x.z);
         let mut gradient = Matrix3::zeros();
-        for (lattice, layer) in self.lattices.iter().zip(self.setting.layers) {
-            let mut jet = lattice.jet(flat);
+        for (band, layer) in self.layers() {
+            let mut jet = self.turbulence.jet(band, flat);
             let [value, slope, bend] = self.ground_ramp(height, layer);
             if value != 1.0 {
                 ramp_second(&mut jet, value, slope, bend);

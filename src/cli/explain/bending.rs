@@ -18,6 +18,10 @@ use crate::turtle;
 const MOST_SHOWN: usize = 8;
 /// Most axes of a group whose vibrations are computed.
 const MOST_MEASURED: usize = 24;
+/// Axes of fewer segments bend less than rods, so that it shows.
+const LIKE_A_ROD: usize = 4;
+/// What to do about that.
+const IN_PIECES: &str = "A segment, one F, bends to one curvature. An axis bends as a rod does if it is drawn in five pieces or more: not F(x), but `for i in 1 .. 5: ( F(x/5) )`";
 /// Number of times at which motion of growth is looked for.
 const LOOKS: u32 = 16;
 /// Seconds that the run to the last frame may take.
@@ -62,6 +66,12 @@ pub struct AxisPlan {
     /// Number of axes of which the last four values are known.
     pub measured: usize,
     pub segments: Range,
+    /// Number of axes with fewer than [`LIKE_A_ROD`] segments, of those that are at least half as long as the longest: shoots that have just begun have few, and
+    /// hardly bend.
+    pub few: usize,
+    /// Least number of segments of these.
+    #[serde(skip)]
+    fewest: usize,
     pub length: Range,
     pub width: Range,
     pub mass: Range,
@@ -139,12 +149,33 @@ impl BendingPlan {
         if let Some(more @ 1..) = self.axes.len().checked_sub(MOST_SHOWN) {
             let _ = writeln!(out, "  … and {more} more sorts of axes (all with `--format json`)");
         }
+        if self.axes.iter().take(MOST_SHOWN).any(|axis| axis.few > 0 && axis.frequency.is_some()) {
+            wrapped(2, IN_PIECES, &mut out);
+        }
         out.push('\n');
         out
     }
 }
 
 impl AxisPlan {
+    /// How an axis of few segments differs from a rod.
+    fn stiffer(&self) -> String {
+        /// Per cent by which the first frequency of an axis of 1, 2 and 3 equal segments is higher than a rod's.
+        const HIGHER: [u32; LIKE_A_ROD - 1] = [29, 5, 2];
+        let least = self.fewest.max(1);
+        // Under its own weight.
+        let less = brief(100.0 / (3.0 * (least * least) as f64), 2);
+        let higher = HIGHER.get(least - 1).unwrap_or(&0);
+        let pieces = if least == 1 { "segment" } else { "segments" };
+        let axis = format!("an axis of {least} {pieces}");
+        let others = match self.few {
+            few if few == self.count => String::new(),
+            1 => format!("; 1 of them has fewer than {LIKE_A_ROD}"),
+            few => format!("; {few} of them have fewer than {LIKE_A_ROD}"),
+        };
+        format!("{axis} sags {less} % less than a rod, and its frequency is {higher} % higher{others}")
+    }
+
     fn text(&self, out: &mut String) {
         let segments = values(self.segments, 1.0);
         let pieces = if self.segments == [1.0, 1.0] { "segment" } else { "segments" };
@@ -184,6 +215,9 @@ impl AxisPlan {
             values(greenhill, 1.0)
         );
         wrapped(4, &line, out);
+        if self.few > 0 {
+            wrapped(4, &format!("note: {}", self.stiffer()), out);
+        }
         if greenhill[1] > 1.0 {
             let what = match self.sags {
                 true => "bends down under its weight",
@@ -269,6 +303,8 @@ fn plan(model: &Model, survey: &Survey, group: &[usize], wind: Option<f64>) -> A
     let axes = || group.iter().map(|i| &survey.axes()[*i]);
     let first = &survey.axes()[group[0]];
     let of = |value: fn(&Axis) -> f64| range(axes().map(value)).unwrap_or_default();
+    let longest = of(|axis| axis.length)[1];
+    let few = || axes().filter(|axis| axis.segments < LIKE_A_ROD && axis.length >= longest / 2.0);
     // Evenly over the group from the shortest to the longest, both included.
     let mut by_length = group.to_vec();
     by_length.sort_by(|a, b| survey.axes()[*a].length.total_cmp(&survey.axes()[*b].length));
@@ -288,6 +324,8 @@ fn plan(model: &Model, survey: &Survey, group: &[usize], wind: Option<f64>) -> A
         count: group.len(),
         measured: measured.len(),
         segments: of(|axis| axis.segments as f64),
+        few: few().count(),
+        fewest: few().map(|axis| axis.segments).min().unwrap_or(LIKE_A_ROD),
         length: of(|axis| axis.length),
         width: of(|axis| axis.width),
         mass: of(|axis| axis.mass),

@@ -17,6 +17,7 @@ use clap::Parser;
 
 use super::args::{Action, Command, GalleryArgs, RenderArgs};
 use super::common::{Failure, out_error};
+use super::one_file::refuse_stream;
 use super::output;
 use super::progress::Progress;
 use super::render::render;
@@ -48,6 +49,7 @@ pub fn gallery(args: &GalleryArgs) -> Result<(), Failure> {
 }
 
 fn draw(wanted: &[&Picture], out: &Path, args: &GalleryArgs) -> Result<(), Failure> {
+    refuse_stream(out, "name a folder: `-o gallery`")?;
     let folder = out.join("models");
     spare(out, &folder)?;
     make(&folder)?;

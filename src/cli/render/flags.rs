@@ -3,6 +3,7 @@
 use super::one_picture;
 use crate::cli::args::RenderArgs;
 use crate::cli::common::{Failure, cores};
+use crate::cli::one_file;
 use crate::cli::shared::Topology;
 use crate::cli::values::{Background, LineWidth, RenderFormat, Sky};
 use crate::render::{CAMERA_SHAPE, Content, Fit, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
@@ -68,6 +69,14 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
             "--fps is for films in one file: choose --format webp, apng, gif, y4m or asvg; of single frames there are as many as `--step S` says",
         ));
     }
+    let single = match format.content() {
+        Content::Mesh => "in which every frame is a file".to_owned(),
+        _ => {
+            let name = one_file::named(&args.shared.model, format.extension());
+            format!("or one frame in a file: `--at T -o {name}`")
+        }
+    };
+    one_file::refuse_stream(&args.out, &format!("name a folder, `-o frames`, {single}"))?;
     let extension = args.out.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let is_file = |name: &str| extension == name;
     if !args.out.is_dir() && OTHERS.contains(&&*extension) {
@@ -91,12 +100,15 @@ pub fn agree(args: &RenderArgs, format: Format) -> Result<(), Failure> {
         .chain(["gif", "webp", "apng", "y4m", "mp4", "webm", "glb", "usda"]);
     if !args.out.is_dir() && known.into_iter().any(is_file) && one_picture::format(args).is_none() {
         let name = args.out.with_extension("");
-        let one = match format.content() {
-            Content::Mesh => "",
-            _ => ", or `--at T` for one frame in a file",
-        };
+        if format.content() == Content::Mesh {
+            return Err(usage(format!(
+                "an OBJ file has its materials in a file beside it, so also a single frame is written into a folder, and {} looks like a file: `-o {} --format obj`; whole animations in one file are --format glb and usda",
+                args.out.display(),
+                name.display()
+            )));
+        }
         return Err(usage(format!(
-            "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj{one}; a whole film in one file is --format webp, apng, gif, y4m or asvg",
+            "-o names a folder, and {} looks like a file: every frame is a file in it; `-o {}` and --format svg, png or obj, or `--at T` for one frame in a file; a whole film in one file is --format webp, apng, gif, y4m or asvg",
             args.out.display(),
             name.display()
         )));

@@ -377,7 +377,7 @@ impl Render<'_> {
             |(record, part)| {
                 manifest.frames.push(record);
                 progress.inc();
-                assembly.add(part).map_err(refuse)
+                part.and_then(|part| assembly.add(part)).map_err(refuse)
             },
         )?;
         self.run.warn();

@@ -11,6 +11,7 @@ use crate::field::Field;
 use crate::painter::{self, Style, text};
 use crate::sky::Sky;
 use crate::{Fit, Page, floor, trace};
+use dlsys_geometry::scene::Scene;
 
 /// Scalable Vector Graphics.
 pub(crate) struct Svg;
@@ -32,11 +33,7 @@ impl Exporter for Svg {
         let (casting, memory) = (Some(whole), Some(&*writer.memory));
         let style = Style { casting, threads: writer.threads, memory, ..style(&fit, &page) };
         let elements = if fit.has_visible_regions() {
-            let field = Field::of(scene, &fit, &page);
-            let beside = field.small(writer.threads)?;
-            let large = field.large();
-            let (scene, floor) = floor::added(&large, &fit, Some(&page));
-            trace::elements(&scene, beside, Style { floor, ..style }, true, "")
+            field(scene, &page, style, (true, ""))?
         } else {
             let (scene, floor) = floor::added(scene, &fit, Some(&page));
             painter::elements(&scene, Style { floor, ..style }, true, "")
@@ -44,6 +41,23 @@ impl Exporter for Svg {
         let parts = around(&page, title, sky.as_ref(), elements);
         parts.iter().try_for_each(|part| out.write_all(part.as_bytes()))
     }
+}
+
+/// The regions that are seen of a scene on a page, with its plants of other models as a [`Field`].
+///
+/// # Errors
+/// If more of these is seen than there is room for.
+pub(crate) fn field(
+    scene: &Scene,
+    page: &Page,
+    style: Style,
+    (named, prefix): (bool, &str),
+) -> io::Result<String> {
+    let field = Field::of(scene, style.fit, page);
+    let beside = field.small(style.threads)?;
+    let large = field.large();
+    let (scene, floor) = floor::added(&large, style.fit, Some(page));
+    Ok(trace::elements(&scene, beside, Style { floor, ..style }, named, prefix))
 }
 
 /// How frames are painted on a page.

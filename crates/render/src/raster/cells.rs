@@ -8,6 +8,8 @@ use crate::mapping::Cut;
 
 /// Pixels that are worked on at a time.
 const LANES: usize = 4;
+/// Pixels of a row that are passed at once where a triangle is behind all of them.
+const BLOCK: usize = 64;
 /// The largest side of a small triangle, in steps.
 const SMALL: i64 = 24 * STEPS;
 /// Half a pixel.
@@ -34,6 +36,7 @@ pub(crate) fn in_middles<'c>(
     mut nearest: Nearest<1>,
 ) -> (Nearest<1>, Vec<[u32; 2]>) {
     let mut spans = vec![[u32::MAX, 0]; height];
+    let mut hidden = Hidden::of(width);
     for number in 0..triangles.count {
         let corners = (triangles.corners)(number);
         // Most are so small that they lie between the middles.
@@ -48,7 +51,8 @@ pub(crate) fn in_middles<'c>(
             nearest.add_small(number as u32 + 1, &ready, [columns, rows], (width, &mut spans));
             continue;
         }
-        nearest.add_middles(number as u32 + 1, &ready, [columns, rows], (width, &mut spans), cut.as_ref());
+        let both = [columns, rows];
+        nearest.add_middles(number as u32 + 1, &ready, both, (&mut spans, &mut hidden), cut.as_ref());
     }
     spans.iter_mut().filter(|[first, _]| *first == u32::MAX).for_each(|span| *span = [0; 2]);
     (nearest, spans)
@@ -114,48 +118,111 @@ impl Nearest<1> {
         }
     }
 
+    /// Adds a triangle, row by row. Where many large ones lie one over another, most of them are hidden, block by block.
     fn add_middles(
         &mut self,
         number: u32,
         ready: &Ready,
         [columns, rows]: [Range<usize>; 2],
-        (width, spans): (usize, &mut [[u32; 2]]),
+        (spans, hidden): (&mut [[u32; 2]], &mut Hidden),
         cut: Option<&Cut<'_>>,
     ) {
-        let plane = ready.plane;
+        let (plane, width) = (ready.plane, hidden.width);
         let ahead = [(columns.start, ready.columns[0]), (rows.start, ready.rows[0])]
             .map(|(to, from)| STEPS * (to as i64 - from as i64) + HALF);
         let mut start = ready.sides.map(|[value, a, b]| value + a * ahead[0] + b * ahead[1]);
         let step = ready.sides.map(|side| side[1] * STEPS);
         for row in rows {
-            let mut here = start;
+            let within = not_negative(start, step, columns.len());
             (0..3).for_each(|k| start[k] += ready.sides[k][2] * STEPS);
-            let mut first = columns.start;
-            while first < columns.end && here[0] | here[1] | here[2] < 0 {
-                (0..3).for_each(|k| here[k] += step[k]);
-                first += 1;
+            if within.is_empty() {
+                continue;
             }
-            let line = row * width;
-            let mut column = first;
-            let (mut next, right) = plane.along([first, row]);
-            while column < columns.end && here[0] | here[1] | here[2] >= 0 {
-                (0..3).for_each(|k| here[k] += step[k]);
-                let is_cut = cut.is_some_and(|cut| !cut.is_drawn([column as f64 + 0.5, row as f64 + 0.5]));
-                let depth = plane.bounded(next);
-                next += right;
-                let ([held], [behind]) = (&mut self.numbers[line + column], &mut self.depths[line + column]);
-                // Later ones have greater numbers.
-                if depth + EQUAL >= *behind && !is_cut {
-                    *behind = if depth > *behind { depth } else { *behind };
-                    *held = number;
+            let (first, end) = (columns.start + within.start, columns.start + within.end);
+            let span = &mut spans[row];
+            *span = [span[0].min(first as u32), span[1].max(end as u32)];
+            let (left, right) = plane.along([first, row]);
+            let depth = |column: usize| plane.bounded(left + right * (column - first) as f32);
+            let mut from = first;
+            while from < end {
+                let block = from / BLOCK;
+                let to = end.min((block + 1) * BLOCK);
+                // The depth grows or falls along a row.
+                let greatest = depth(from).max(depth(to - 1));
+                if greatest + EQUAL >= hidden.least(block, row) {
+                    let cells = row * width + from..row * width + to;
+                    let held = self.numbers[cells.clone()].iter_mut();
+                    for (column, ([held], [behind])) in (from..to).zip(held.zip(&mut self.depths[cells])) {
+                        let depth = depth(column);
+                        // Later ones have greater numbers.
+                        if depth + EQUAL >= *behind
+                            && cut.is_none_or(|cut| cut.is_drawn([column as f64 + 0.5, row as f64 + 0.5]))
+                        {
+                            *behind = if depth > *behind { depth } else { *behind };
+                            *held = number;
+                        }
+                    }
+                    if to - from == hidden.size(block) {
+                        hidden.look(block, row, &self.depths);
+                    }
                 }
-                column += 1;
-            }
-            if column > first {
-                let [from, end] = &mut spans[row];
-                (*from, *end) = ((*from).min(first as u32), (*end).max(column as u32));
+                from = to;
             }
         }
+    }
+}
+
+/// The part of so many places in a row at which none of three linear functions is negative, given their values at the first place and their steps.
+fn not_negative(values: [i64; 3], steps: [i64; 3], count: usize) -> Range<usize> {
+    let (mut first, mut end) = (0, count as i64);
+    for (value, step) in values.into_iter().zip(steps) {
+        match step {
+            0 if value < 0 => return 0..0,
+            0 => {}
+            1.. => first = first.max((-value).div_euclid(step) + i64::from((-value).rem_euclid(step) > 0)),
+            _ => end = end.min(value.div_euclid(-step) + 1),
+        }
+    }
+    first as usize..end.max(first) as usize
+}
+
+/// What is hidden in a raster: a lower bound of the depths of each block of pixels of a row.
+struct Hidden {
+    width: usize,
+    /// Empty before the first is known.
+    least: Vec<f32>,
+}
+
+impl Hidden {
+    /// A raster of which nothing is known.
+    fn of(width: usize) -> Hidden {
+        Hidden { width, least: Vec::new() }
+    }
+
+    fn index(&self, block: usize, row: usize) -> usize {
+        row * self.width.div_ceil(BLOCK) + block
+    }
+
+    fn least(&self, block: usize, row: usize) -> f32 {
+        self.least.get(self.index(block, row)).copied().unwrap_or(f32::NEG_INFINITY)
+    }
+
+    /// Pixels of a block.
+    fn size(&self, block: usize) -> usize {
+        BLOCK.min(self.width - block * BLOCK)
+    }
+
+    /// Takes note of the depths of a block. They only grow.
+    fn look(&mut self, block: usize, row: usize, depths: &[[f32; 1]]) {
+        let from = row * self.width + block * BLOCK;
+        let depths = depths[from..from + self.size(block)].iter();
+        let index = self.index(block, row);
+        if index >= self.least.len() {
+            let blocks = self.index(0, row + 1);
+            self.least.resize(blocks, f32::NEG_INFINITY);
+        }
+        self.least[index] =
+            depths.fold(f32::INFINITY, |least, [depth]| if *depth < least { *depth } else { least });
     }
 }
 
@@ -203,7 +270,7 @@ mod tests {
                 assert!(is_small(&corners));
                 let Some(ready) = Ready::new(corners, width, &(0..height)) else { continue };
                 let both = [middles(corners.map(|p| p.x), width), middles(corners.map(|p| p.y), height)];
-                plain.add_middles(number, &ready, both, (width, &mut rows), None);
+                plain.add_middles(number, &ready, both, (&mut rows, &mut Hidden::of(width)), None);
             }
             // At depths that are equal but for rounding, the two may differ.
             let differing = found.numbers.iter().zip(&plain.numbers).filter(|(a, b)| a != b).count();
@@ -214,5 +281,55 @@ mod tests {
                 assert!((0..width).all(|column| line[column] == [0] || is_within(column)), "round {round}");
             }
         }
+    }
+
+    /// Many large ones, one over another, in any order: what is hidden is passed by, and nothing else is.
+    #[test]
+    fn blocks_that_hide_what_is_behind_change_nothing() {
+        let (width, height) = (200, 40);
+        let mut state = 11_u64;
+        let mut random = |most: f64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 * most
+        };
+        let triangles: Vec<[Place; 3]> = (0..300)
+            .map(|_| {
+                let depth = random(1.0);
+                [(); 3].map(|()| {
+                    Corner { x: random(400.0) - 100.0, y: random(100.0) - 30.0, depth: depth + random(0.05) }
+                        .place()
+                })
+            })
+            .collect();
+        let empty = || Nearest {
+            numbers: vec![[0]; width * height],
+            depths: vec![[f32::NEG_INFINITY]; width * height],
+        };
+        let given = Given { count: triangles.len(), corners: |n: usize| triangles[n], cut: |_| None };
+        let (found, spans) = in_middles([width, height], &given, empty());
+        // Nothing is known to be hidden if each begins anew.
+        let (mut plain, mut rows) = (empty(), vec![[u32::MAX, 0]; height]);
+        for (number, &corners) in (1..).zip(&triangles) {
+            let Some(ready) = Ready::new(corners, width, &(0..height)) else { continue };
+            let both = [middles(corners.map(|p| p.x), width), middles(corners.map(|p| p.y), height)];
+            plain.add_middles(number, &ready, both, (&mut rows, &mut Hidden::of(width)), None);
+            // At each middle a triangle is where its sides say, one by one.
+            for row in 0..height {
+                let at = |column: usize| {
+                    let ahead = [(column, ready.columns[0]), (row, ready.rows[0])]
+                        .map(|(to, from)| STEPS * (to as i64 - from as i64) + HALF);
+                    ready.sides.iter().all(|[value, a, b]| value + a * ahead[0] + b * ahead[1] >= 0)
+                };
+                let columns = (0..width).filter(|column| at(*column));
+                let held = |column: &usize| plain.numbers[row * width + column] >= [number];
+                let covered = columns.filter(|column| !held(column));
+                let depths = |column: usize| plain.depths[row * width + column][0];
+                assert!(covered.into_iter().all(|column| depths(column) > f32::NEG_INFINITY), "{number}");
+            }
+        }
+        assert!(found.numbers == plain.numbers && found.depths == plain.depths);
+        assert!(spans.iter().zip(&rows).all(|(a, b)| a == b || b[0] == u32::MAX));
+        let seen: std::collections::HashSet<u32> = found.numbers.iter().map(|[number]| *number).collect();
+        assert!((10..250).contains(&seen.len()), "{}", seen.len());
     }
 }
