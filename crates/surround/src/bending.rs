@@ -271,6 +271,11 @@ impl<'w, M: Deref<Target = Model>> Bending<'w, M> {
         Bending { modal: modes.map(Modal::new), ..self }
     }
 
+    /// Drops what is known of the wind at the last instants.
+    pub(crate) fn forget_wind(&self) {
+        self.wind.forget();
+    }
+
     pub(crate) fn model(&self) -> &Model {
         &self.model
     }

@@ -117,6 +117,7 @@ impl<'m> Motion<'m> {
             Bending::new(model, sampler.clone(), place, passive.solver).by_modes(passive.modes.clone());
         let mut flights = Flights::new(model, sampler, place, passive.solver.tolerance);
         let present = Course::new(model, (growth, bending), &mut flights)?;
+        present.bending.forget_wind();
         let courses = Courses {
             start: present.clone(),
             past: Recent::new(passive.kept),
@@ -149,6 +150,8 @@ impl<'m> Motion<'m> {
         while (courses.present.number as f64) < number {
             courses.tick()?;
         }
+        // Each of many plants would keep instants of its own.
+        courses.present.bending.forget_wind();
         Ok(())
     }
 

@@ -31,6 +31,13 @@ impl<'m> Sampler<'m> {
         Sampler { weather, last, steps, failure, place }
     }
 
+    /// Drops the last instants, which are large.
+    pub(crate) fn forget(&self) {
+        for last in [&self.last, &self.steps] {
+            *last.lock().unwrap_or_else(PoisonError::into_inner) = Default::default();
+        }
+    }
+
     /// What is in the way of what falls.
     pub(crate) fn in_the_way(&self) -> Among<'_, 'm> {
         let nothing = Among { obstacles: None, footing: None };
