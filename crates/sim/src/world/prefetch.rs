@@ -25,12 +25,12 @@ pub fn prefetch(world: &World, visited: &[ModuleId], at: usize) {
         return;
     }
     if let Some(id) = visited.get(at + 2 * AHEAD) {
-        // The pointer to the state has to be prefetched before the state, the place of the values before the values.
-        world.states.get(id.slot()).into_iter().for_each(fetch);
+        // The place of the state has to be prefetched before the state, the place of the values before the values.
+        world.states.place(id.slot()).into_iter().for_each(fetch);
         world.tree.record(id.slot()).into_iter().for_each(fetch);
     }
     if let Some(&id) = visited.get(at + AHEAD) {
-        world.states.get(id.slot()).and_then(Option::as_deref).into_iter().for_each(fetch);
+        world.states.get(id.slot()).into_iter().for_each(fetch);
         world.tree.parameters(id).first().into_iter().for_each(fetch);
     }
 }
@@ -42,11 +42,11 @@ pub fn prefetch_events(world: &World, neighbours: &Neighbours, mut soon: impl It
         return;
     }
     let locate = |slot: usize| {
-        world.states.get(slot).into_iter().for_each(fetch);
+        world.states.place(slot).into_iter().for_each(fetch);
         neighbours.prefetch(slot);
     };
     if let Some(next) = soon.next() {
-        world.states.get(next as usize).and_then(Option::as_deref).into_iter().for_each(fetch);
+        world.states.get(next as usize).into_iter().for_each(fetch);
         neighbours.beside(next as usize).for_each(|id| locate(id.slot()));
     }
     soon.for_each(|slot| locate(slot as usize));
@@ -54,7 +54,7 @@ pub fn prefetch_events(world: &World, neighbours: &Neighbours, mut soon: impl It
 
 /// True if there are so many states that the caches do not hold them.
 pub fn is_large(world: &World) -> bool {
-    world.states.len() >= FEW
+    world.states.slots() >= FEW
 }
 
 /// Prefetches all cache lines of a value.
