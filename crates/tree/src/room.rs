@@ -17,8 +17,13 @@ pub fn step(len: usize) -> usize {
 #[inline]
 pub fn reserve<T>(list: &mut Vec<T>, more: usize) {
     if list.capacity() - list.len() < more {
-        list.reserve_exact(more.max(step(list.len())));
+        grow(list, more);
     }
+}
+
+#[cold]
+fn grow<T>(list: &mut Vec<T>, more: usize) {
+    list.reserve_exact(more.max(step(list.len())));
 }
 
 /// The same where there may not be so much memory.
@@ -44,9 +49,16 @@ pub fn push<T>(list: &mut Vec<T>, element: T) {
 #[inline]
 pub fn lengthen<T>(list: &mut Vec<T>, len: usize, make: impl FnMut() -> T) {
     if list.len() < len {
-        reserve(list, len - list.len());
-        list.resize_with(len, make);
+        fill(list, len, make);
     }
+}
+
+/// Apart, so that the question before it stands in the place of the call: most lists are long enough.
+#[cold]
+#[inline(never)]
+fn fill<T>(list: &mut Vec<T>, len: usize, make: impl FnMut() -> T) {
+    reserve(list, len - list.len());
+    list.resize_with(len, make);
 }
 
 #[cfg(test)]

@@ -301,9 +301,9 @@ mod tests {
         replace(&mut solution, &[200.0, 300.0], &[1, 2]);
         assert_eq!(values(&solution), [10.0, 200.0, 300.0].map(Some));
         assert!(solution.free.is_empty(), "the first component still follows the first stretch");
+        // The stretch that it leaves is followed by nobody, and the new one takes its place.
         replace(&mut solution, &[100.0], &[0]);
-        assert_eq!((solution.free.len(), solution.stretches.len()), (1, 4));
-        // The next one has the place.
+        assert_eq!((solution.free.len(), solution.stretches.len()), (0, 3));
         replace(&mut solution, &[3000.0], &[2]);
         assert_eq!((solution.free.len(), solution.stretches.len()), (0, 4));
         assert_eq!(values(&solution), [100.0, 200.0, 3000.0].map(Some));
@@ -313,6 +313,7 @@ mod tests {
         assert_eq!(solution.free.len(), 1);
         // Several stretches end to end take places of their own.
         solution.replace(&mut vec![rest(&[5.0]), rest(&[6.0])], &[0], 3);
-        assert_eq!(solution.value(0, SimTime::ZERO), Some(6.0));
+        assert_eq!([0.0, 1.0].map(|t| solution.value(0, SimTime::new(t))), [5.0, 6.0].map(Some));
+        assert_eq!((solution.free.len(), solution.stretches.len()), (2, 6));
     }
 }

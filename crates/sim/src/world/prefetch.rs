@@ -52,6 +52,31 @@ pub fn prefetch_events(world: &World, neighbours: &Neighbours, mut soon: impl It
     soon.for_each(|slot| locate(slot as usize));
 }
 
+/// What a walk in string order comes to next, by a list of modules that were in that order before: each link of the walk would wait for
+/// memory, because it says where the next one is.
+pub struct Guide<'b> {
+    before: &'b [ModuleId],
+    passed: usize,
+}
+
+impl Guide<'_> {
+    pub fn new<'b>(world: &World, before: &'b [ModuleId]) -> Guide<'b> {
+        Guide { before: if is_large(world) { before } else { &[] }, passed: 0 }
+    }
+
+    /// The walk has come to a module, one of the list or a new one between those.
+    #[inline]
+    pub fn pass(&mut self, world: &World, id: ModuleId) {
+        let Some(known) = self.before.get(self.passed) else { return };
+        if *known == id || !world.tree.is_alive(*known) {
+            self.passed += 1;
+        }
+        if let Some(next) = self.before.get(self.passed + 2 * AHEAD) {
+            world.tree.record(next.slot()).into_iter().for_each(fetch);
+        }
+    }
+}
+
 /// True if there are so many states that the caches do not hold them.
 pub fn is_large(world: &World) -> bool {
     world.states.slots() >= FEW

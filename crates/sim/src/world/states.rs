@@ -1,7 +1,7 @@
 //! The states of materialised modules, by slot of the tree.
 //!
-//! Each is a box: side by side in pages, with a list of their places, they take a twentieth less memory, and an event a twentieth more
-//! instructions, because it looks for a state a hundred times.
+//! Each is a box. Side by side in pages, with a list of their places, they would take a fiftieth less memory, and an event of a tissue a
+//! twentieth more instructions, because it looks for a state a hundred times.
 
 use super::state::State;
 use dlsys_tree::{ModuleId, room};

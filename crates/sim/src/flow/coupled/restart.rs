@@ -11,7 +11,7 @@ use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::coupled_solution::CoupledSolution;
-use crate::world::prefetch::prefetch;
+use crate::world::prefetch::{Guide, prefetch};
 use dlsys_tree::{ModuleId, SimTime, Visit, room};
 
 /// A solution without steps begins anew, for all modules, at every event; after this many events steps are made.
@@ -42,13 +42,15 @@ impl FlowStage<'_, '_> {
 
     /// The coupled modules in string order. Their present values become those of the tree and of the state vector.
     fn gather_members(&mut self, at: SimTime) -> Vec<ModuleId> {
-        let mut members = std::mem::take(&mut self.flows.coupled.members);
-        members.clear();
+        let before = std::mem::take(&mut self.flows.coupled.members);
+        let (mut guide, mut members) = (Guide::new(self.world, &before), Vec::new());
+        room::reserve(&mut members, before.len());
         for visit in self.world.tree.walk() {
-            if let Visit::Module(id) = visit
-                && self.world.states.get(id.slot()).is_some()
-            {
-                room::push(&mut members, id);
+            if let Visit::Module(id) = visit {
+                guide.pass(self.world, id);
+                if self.world.states.get(id.slot()).is_some() {
+                    room::push(&mut members, id);
+                }
             }
         }
         let solution = self.world.coupled.take();
