@@ -154,7 +154,7 @@ impl IndexedQueue {
             Owner::Module(slot) => self.serials.get(slot as usize).copied(),
         };
         let valid = move |kept: &Kept| serial(kept.entry().owner) == Some(kept.serial);
-        self.heap.iter().filter_map(move |kept| valid(kept).then(|| kept.entry()))
+        self.heap.iter().filter(move |kept| valid(kept)).map(Kept::entry)
     }
 
     /// Removes the entry that `peek` has returned.
