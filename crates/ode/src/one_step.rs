@@ -77,6 +77,14 @@ pub trait OneStep {
         self.error_order()
     }
 
+    /// The number of stages of the workspace that a step and its dense output use; no less than two, which the first step is guessed with.
+    fn stages(&self) -> usize;
+
+    /// The stage that [`OneStep::accept`] makes the first of the next step, if there is one.
+    fn carried(&self) -> usize {
+        0
+    }
+
     /// Where in a step the rates are evaluated that its error estimate depends on, as fractions of it, from 0 to 1.
     fn nodes(&self) -> &[f64];
 

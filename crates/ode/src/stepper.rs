@@ -9,6 +9,9 @@ use crate::workspace::Workspace;
 use crate::{Error, Method, Rates};
 use dlsys_expr::SimTime;
 
+/// The memory of smaller systems is kept between steps: it stays in the caches.
+const MANY: usize = 4096;
+
 /// The longest step. Where all errors are zero steps grow without end; beyond this number nothing is left to follow, and far beyond
 /// it the positions of stages are no numbers.
 const LONGEST: f64 = 1e100;
@@ -160,7 +163,7 @@ impl Stepper {
         self.rate_is_known = false;
         self.noisy = false;
         self.work.noise.clear();
-        self.work.resize(n);
+        self.work.end.resize(n, 0.0);
         self.scheme = method.scheme();
         self.schemes.forget();
     }
@@ -229,6 +232,7 @@ impl Stepper {
         self.scheme = Some(scheme);
         self.has_been_implicit |= facts.is_implicit;
         self.schemes.prepare(scheme, tolerance);
+        self.work.provide(y.len(), self.schemes.stages(scheme));
         self.work.keep_reached(self.reached_is_kept);
         if !self.rate_is_known {
             self.work.start(system, y).map_err(Error::RateNotFinite)?;
@@ -474,6 +478,14 @@ impl Stepper {
             from = end;
         }
         pieces
+    }
+
+    /// Gives back the memory that only the making of a step takes, if that is much: some 140 bytes a component. What is left to do with
+    /// the step just made is [`Stepper::advance`]; it has no dense output any more.
+    pub fn rest(&mut self) {
+        if self.size() > MANY {
+            self.work.give_back(self.schemes.carried(self.scheme()));
+        }
     }
 
     /// Makes the end of the step just made the start of the next: `y` becomes the state there.

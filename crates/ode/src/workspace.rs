@@ -37,6 +37,8 @@ pub struct Workspace {
     pub(crate) other_end: Vec<f64>,
     /// The state at the end of the step.
     pub(crate) end: Vec<f64>,
+    /// The number of components and of stages that there is room for.
+    provided: (usize, usize),
     /// The least and the greatest values of the components at the stages of the step just tried, where these are kept.
     pub(crate) reached: [Vec<f64>; 2],
     pub(crate) reached_is_kept: bool,
@@ -53,20 +55,29 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// Fits the memory to systems of `n` components.
-    pub fn resize(&mut self, n: usize) {
-        if self.end.len() == n && !self.k.is_empty() {
+    /// Fits the memory to systems of `n` components, and makes room for so many stages.
+    pub fn provide(&mut self, n: usize, stages: usize) {
+        self.end.resize(n, 0.0);
+        if self.provided == (n, stages) {
             return;
         }
+        self.provided = (n, stages);
         let places = n.next_multiple_of(PART);
-        if self.k.first().is_none_or(|k| k.len() != places) {
+        if self.k.is_empty() {
             self.k.resize(MAX_STAGES, Column::default());
-            self.k.iter_mut().for_each(|k| k.resize(places));
         }
+        self.k[..stages].iter_mut().for_each(|k| k.resize(places));
         self.from.resize(places);
         self.stage.resize(places);
         self.other_end.resize(n, 0.0);
-        self.end.resize(n, 0.0);
+    }
+
+    /// Gives back all memory of the step just made that the next one does not read: all but one stage, and the end.
+    pub(crate) fn give_back(&mut self, carried: usize) {
+        let others = self.k.iter_mut().enumerate().filter(|(stage, _)| *stage != carried);
+        others.map(|(_, k)| k).chain([&mut self.from, &mut self.stage]).for_each(|k| *k = Column::default());
+        self.other_end = Vec::new();
+        self.provided = (0, 0);
     }
 
     /// Keeps the range of the components at the stages, or does not.

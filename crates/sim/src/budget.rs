@@ -14,7 +14,7 @@ use crate::setup::Setup;
 use crate::world::World;
 use crate::world::state::State;
 use dlsys_model::KindId;
-use dlsys_tree::SimTime;
+use dlsys_tree::{SimTime, room};
 
 /// Productions and steps after which the pace is looked at: so many at least, and so many for each module.
 const LOOK: u64 = 100_000;
@@ -182,8 +182,8 @@ pub fn out_of_memory(world: &World, shortage: Shortage, site: Site) -> Error {
     Error::OutOfMemory { modules: world.tree.len(), shortage: Box::new(shortage), site }
 }
 
-/// Makes room for modules of these kinds, with so many parameters. Where lists must grow for that, they are twice as long afterwards, and everything that is
-/// kept of modules grows with them: that is asked for at once.
+/// Makes room for modules of these kinds, with so many parameters. Where lists must grow for that ([`room`]), everything that is kept of modules grows with them:
+/// that is asked for at once.
 ///
 /// # Errors
 /// If the memory is not there.
@@ -207,8 +207,12 @@ fn grow(
     coupled: usize,
     (kinds, width): (&[KindId], usize),
 ) -> Result<(), Shortage> {
-    let wanted = 2 * size(setup, world, coupled) as u64 + IN_LISTS * world.tree.slots() as u64;
-    memory::ask(wanted, setup.settings.max_memory, world.tree.size() as u64)?;
+    let (slots, known) = (world.tree.slots().max(1), world.tree.size() as u64);
+    let more = kinds.len().max(room::step(slots)) as f64 / slots as f64;
+    let grown = size(setup, world, coupled) as u64 + IN_LISTS * slots as u64;
+    // A list may be there twice while it grows.
+    let wanted = (more * grown as f64) as u64 + known;
+    memory::ask(wanted, setup.settings.max_memory, known)?;
     let grown = world.tree.make_room(kinds, width);
     grown.map_err(|_| Shortage { wanted, there: None, own_limit: false })
 }
@@ -217,8 +221,14 @@ fn grow(
 pub fn size(setup: &Setup, world: &World, coupled: usize) -> usize {
     /// The cost of a coupled component: its equations, a step, the working memory of the method.
     const COMPONENT: usize = 400;
+    /// Of more slots than this, one of so many is looked at.
+    const MANY: usize = 4096;
+    const SOME: usize = 16;
     let numeric = |state: &State| state.step.as_ref().map_or(0, |step| size_of_val(&**step) + 400);
-    let states: usize = world.states.iter().flatten().map(|s| size_of::<State>() + 100 + numeric(s)).sum();
+    // Most are not in the caches, and some tell what all are like.
+    let every = if world.states.slots() > MANY { SOME } else { 1 };
+    let some = world.states.iter().step_by(every);
+    let states = every * some.map(|s| size_of::<State>() + 100 + numeric(s)).sum::<usize>();
     let known = if setup.looks_around { 100 } else { 0 };
     let events = 12 * world.tree.len();
     world.tree.size()
@@ -226,5 +236,5 @@ pub fn size(setup: &Setup, world: &World, coupled: usize) -> usize {
         + states
         + COMPONENT * coupled
         + known * world.tree.slots()
-        + 8 * world.states.len()
+        + 8 * world.states.slots()
 }

@@ -262,7 +262,7 @@ impl<'m> Simulation<'m> {
         }
         // A stretch of a closed form costs nothing to go on from.
         if let Owner::Module(slot) = entry.owner
-            && self.world.states[slot as usize].as_ref().is_some_and(|s| s.coupled || !s.is_numeric())
+            && self.world.states.get(slot as usize).is_some_and(|s| s.coupled || !s.is_numeric())
         {
             return true;
         }
@@ -278,7 +278,7 @@ impl<'m> Simulation<'m> {
             Owner::Coupled => self.flow_stage().pass_coupled_step(entry.at),
             Owner::Derivation | Owner::Tick => unreachable!("they are events"),
             Owner::Module(slot) => {
-                let id = self.world.states[slot as usize].as_ref().expect("scheduled").id;
+                let id = self.world.states.get(slot as usize).expect("scheduled").id;
                 self.flow_stage().pass_window(id, entry.at)
             }
         }
@@ -344,7 +344,7 @@ impl<'m> Simulation<'m> {
                 }
                 NextEvent::Lazy(_, slot) => Some(self.world.tree.id(slot)),
                 NextEvent::Other(Entry { owner: Owner::Module(slot), .. }) => {
-                    Some(self.world.states[slot as usize].as_ref().expect("scheduled").id)
+                    Some(self.world.states.get(slot as usize).expect("scheduled").id)
                 }
                 NextEvent::Other(_) => None,
             };
@@ -446,7 +446,7 @@ fn is_event(world: &World, owner: Owner) -> bool {
         Owner::Coupled => false,
         Owner::Derivation | Owner::Tick => true,
         Owner::Module(slot) => {
-            world.states[slot as usize].as_ref().is_some_and(|s| s.next.kind != NextKind::Window)
+            world.states.get(slot as usize).is_some_and(|s| s.next.kind != NextKind::Window)
         }
     }
 }
@@ -456,7 +456,7 @@ fn site_of_next(setup: &Setup, world: &World, flows: &Flows, events: &Events, ne
     let id = match next {
         NextEvent::Lazy(_, slot) => world.tree.id(slot),
         NextEvent::Other(entry) => match entry.owner {
-            Owner::Module(slot) => match &world.states[slot as usize] {
+            Owner::Module(slot) => match world.states.get(slot as usize) {
                 Some(state) => state.id,
                 None => flows.anyone(world),
             },

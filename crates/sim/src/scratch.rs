@@ -11,13 +11,17 @@ pub struct Scratch {
     pub rates: Vec<f64>,
 }
 
-/// Lists that were longer are not kept for the next instant.
+/// Lists that get longer are made as long as they may become at once: growing bit by bit, they would be there twice.
 pub const LONG: usize = 1 << 18;
+
+/// Lists that were longer are not kept for the next instant: what is done for so many modules costs much more than a new list, and
+/// ten of them would be a tenth of what is kept of a tissue.
+const KEPT: usize = 1 << 12;
 
 /// Empties a list, and gives back its memory if that is much.
 pub fn clear<T>(list: &mut Vec<T>) {
     list.clear();
-    if list.capacity() > LONG {
+    if list.capacity() > KEPT {
         *list = Vec::new();
     }
 }

@@ -48,6 +48,8 @@ pub struct Setup<'m> {
     pub is_algebraic: bool,
     /// Some rates may have pulses.
     pub has_pulses: bool,
+    /// Some rule has conditions.
+    pub has_conditions: bool,
 }
 
 impl<'m> Setup<'m> {
@@ -88,6 +90,7 @@ impl<'m> Setup<'m> {
             reads_ground: model.reads_ground(),
             is_algebraic,
             has_pulses: solves().any(|solve| !solve.pulses.is_empty()),
+            has_conditions: model.rules.iter().any(|rule| !rule.atoms.is_empty()),
         }
     }
 

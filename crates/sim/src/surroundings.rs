@@ -362,7 +362,7 @@ impl<'m> Simulation<'m> {
         }
         // The trajectories up to now have the slopes before; they end where the next ones begin.
         let state = self.world.state(id);
-        match state.and_then(|state| Some((state.rule?, state.context.clone()))) {
+        match state.and_then(|state| Some((state.rule.get()?, state.context.clone()))) {
             Some((rule, context)) => self.event_stage().take_up_with(id, rule, &context, &given),
             None => {
                 self.world.rebase_with(id, now, &given);

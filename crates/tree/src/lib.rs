@@ -21,6 +21,7 @@
 
 mod chance;
 mod lineage;
+pub mod room;
 mod siblings;
 mod string;
 mod tree;

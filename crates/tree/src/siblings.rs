@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Family, Lineage, SimTime};
+use super::{Family, Lineage, SimTime, room};
 
 /// The number of no group: brackets belong to none.
 pub(super) const NO_GROUP: u32 = u32::MAX;
@@ -49,8 +49,8 @@ impl SiblingGroups {
                 number
             }
             None => {
-                self.all.push(group);
-                self.generations.push(family.generation);
+                room::push(&mut self.all, group);
+                room::push(&mut self.generations, family.generation);
                 self.all.len() as u32 - 1
             }
         };

@@ -8,15 +8,18 @@
 //! (`siblings.rs`). At a million modules, memory access dominates all costs.
 
 mod chain;
+mod node;
 
 use std::collections::TryReserveError;
 
 use smallvec::SmallVec;
 
 use super::siblings::{NO_GROUP, SiblingGroups};
-use super::{Family, Lineage, SimTime};
+use super::{Family, Lineage, SimTime, room};
 pub use chain::LastOfChain;
 use dlsys_model::KindId;
+pub use node::NO_LABEL;
+pub(super) use node::{Link, Node};
 
 /// The branch that holds the main axis.
 pub(super) const TRUNK: u32 = 0;
@@ -44,43 +47,6 @@ impl ModuleId {
     pub(super) fn of_parts(slot: u32, generation: u32) -> ModuleId {
         ModuleId { slot, generation }
     }
-}
-
-/// The neighbour before or after on an axis: a module or a branch, by its slot; at an end of the axis, the branch that the axis
-/// belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Link(pub(super) u32);
-
-impl Link {
-    const END: u32 = 1 << 31;
-
-    /// The end of a branch's axis.
-    fn end_of(branch: u32) -> Link {
-        Link(branch | Link::END)
-    }
-
-    /// The branch whose axis ends here.
-    pub(super) fn ended(self) -> Option<u32> {
-        (self.0 & Link::END != 0).then_some(self.0 & !Link::END)
-    }
-}
-
-/// The label of modules that have been given none.
-pub const NO_LABEL: u16 = u16::MAX;
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Node {
-    /// `KindId::OPEN` for a branch.
-    pub kind: KindId,
-    /// Number of modules that the slot has had before.
-    pub generation: u32,
-    pub before: Link,
-    pub after: Link,
-    /// Of a module, where the parameters begin; of a branch, the first node of its axis.
-    pub first: u32,
-    pub group: u32,
-    pub place: u16,
-    pub label: u16,
 }
 
 /// A module of a [`Tree`]: all that the tree stores of it, read at once.
@@ -282,7 +248,7 @@ impl Tree {
                 ModuleId { slot, generation: node.generation }
             }
             None => {
-                self.nodes.push(node);
+                room::push(&mut self.nodes, node);
                 ModuleId { slot: self.nodes.len() as u32 - 1, generation: 0 }
             }
         }
@@ -299,6 +265,7 @@ impl Tree {
                 first
             }
             None => {
+                room::reserve(&mut self.values, values.len());
                 self.values.extend_from_slice(values);
                 (self.values.len() - values.len()) as u32
             }
@@ -327,8 +294,8 @@ impl Tree {
     ///
     /// There is not enough memory.
     pub fn make_room(&mut self, kinds: &[KindId], width: usize) -> Result<(), TryReserveError> {
-        self.nodes.try_reserve(kinds.len().saturating_sub(self.free.len()))?;
-        if self.has_free_values(kinds) { Ok(()) } else { self.values.try_reserve(width) }
+        room::try_reserve(&mut self.nodes, kinds.len().saturating_sub(self.free.len()))?;
+        if self.has_free_values(kinds) { Ok(()) } else { room::try_reserve(&mut self.values, width) }
     }
 
     fn release(&mut self, slot: u32) {
@@ -367,9 +334,9 @@ impl Tree {
         family: Family,
         made: &mut Vec<ModuleId>,
     ) {
-        self.nodes.reserve(kinds.len());
-        self.values.reserve(arguments.len());
-        made.reserve(kinds.len());
+        room::reserve(&mut self.nodes, kinds.len());
+        room::reserve(&mut self.values, arguments.len());
+        room::reserve(made, kinds.len());
         let mut last = Link::end_of(TRUNK);
         let mut next = Link(self.nodes[TRUNK as usize].first);
         while next.ended().is_none() {
@@ -496,13 +463,6 @@ impl Tree {
         if after.ended().is_none() {
             self.nodes[after.0 as usize].before = before;
         }
-    }
-}
-
-impl Node {
-    pub fn places(&self, arities: &[u32]) -> std::ops::Range<usize> {
-        let first = self.first as usize;
-        first..first + arities[self.kind.index()] as usize
     }
 }
 

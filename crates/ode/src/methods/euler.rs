@@ -15,6 +15,10 @@ impl OneStep for Euler {
         1
     }
 
+    fn stages(&self) -> usize {
+        2
+    }
+
     fn nodes(&self) -> &[f64] {
         &[0.0, 0.5, 1.0]
     }

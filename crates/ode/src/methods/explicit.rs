@@ -128,6 +128,14 @@ impl<P: Pair> OneStep for Explicit<P> {
         P::TABLEAU.error_order
     }
 
+    fn stages(&self) -> usize {
+        P::TABLEAU.a.len()
+    }
+
+    fn carried(&self) -> usize {
+        P::TABLEAU.stages - 1
+    }
+
     fn nodes(&self) -> &[f64] {
         &self.nodes
     }
@@ -181,7 +189,7 @@ impl<P: Pair> OneStep for Explicit<P> {
     }
 
     fn accept(&mut self, work: &mut Workspace) -> bool {
-        work.k.swap(0, P::TABLEAU.stages - 1);
+        work.k.swap(0, self.carried());
         true
     }
 }

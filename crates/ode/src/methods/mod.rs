@@ -92,6 +92,14 @@ macro_rules! methods {
                 match scheme { $(Scheme::$variant => self.$field.starting_order(),)* }
             }
 
+            pub fn stages(&self, scheme: Scheme) -> usize {
+                match scheme { $(Scheme::$variant => self.$field.stages(),)* }
+            }
+
+            pub fn carried(&self, scheme: Scheme) -> usize {
+                match scheme { $(Scheme::$variant => self.$field.carried(),)* }
+            }
+
             pub fn nodes(&self, scheme: Scheme) -> &[f64] {
                 match scheme { $(Scheme::$variant => self.$field.nodes(),)* }
             }

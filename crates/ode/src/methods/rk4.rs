@@ -18,6 +18,14 @@ impl OneStep for Rk4 {
         1
     }
 
+    fn stages(&self) -> usize {
+        LAST + 1
+    }
+
+    fn carried(&self) -> usize {
+        LAST
+    }
+
     fn nodes(&self) -> &[f64] {
         &[0.0, 0.5, 1.0]
     }
@@ -55,7 +63,7 @@ impl OneStep for Rk4 {
     }
 
     fn accept(&mut self, work: &mut Workspace) -> bool {
-        work.k.swap(0, LAST);
+        work.k.swap(0, self.carried());
         true
     }
 }

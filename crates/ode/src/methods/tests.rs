@@ -3,7 +3,7 @@
 use super::*;
 use crate::control::{Control, StepSettings};
 use crate::stepper::Stepper;
-use crate::workspace::Workspace;
+use crate::workspace::{MAX_STAGES, Workspace};
 
 /// y' = y cos(t), y(0) = 1: y = exp(sin t).
 struct Growth {
@@ -32,7 +32,7 @@ impl Rates for Growth {
 fn errors(scheme: Scheme, steps: usize) -> (f64, f64) {
     let h = 2.0 / steps as f64;
     let (mut work, mut schemes) = (Workspace::default(), Schemes::default());
-    work.resize(1);
+    work.provide(1, MAX_STAGES);
     schemes.prepare(scheme, 1.0);
     let mut y = vec![1.0];
     let (mut end, mut inside): (f64, f64) = (0.0, 0.0);
@@ -92,7 +92,7 @@ impl Rates for Decay {
 fn the_measured_interior_error_is_close_to_the_true_one() {
     for z in [-25.0, -16.0, -12.0, -10.0, -8.3, -7.0, -6.0, -5.0, -4.0, -2.0, -1.0, 1.0, 2.0] {
         let (mut work, mut schemes, mut system) = (Workspace::default(), Schemes::default(), Decay(z));
-        work.resize(1);
+        work.provide(1, MAX_STAGES);
         work.start(&mut system, &[1.0]).expect("finite");
         let step = Step { y: &[1.0], start: SimTime::ZERO, h: 1.0 };
         schemes.attempt(Scheme::Dop853, &mut work, &mut system, step, 1e-9);

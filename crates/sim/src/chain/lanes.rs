@@ -16,7 +16,6 @@ use crate::flow::prediction::{
 use crate::scratch::Scratch;
 use crate::trajectory::{Riccati, Trajectory};
 use crate::world::life::{End, LifeClass, Lives};
-use crate::world::state::Change;
 
 /// The life of a newborn.
 #[derive(Clone, Copy, Debug)]
@@ -364,16 +363,14 @@ impl Block {
                 Outlives::Not => return None,
             }
         }
-        let atom = change.map(|change| change.atom);
+        let atom = change.map(|change| change.atom());
         let label = match (atom, class.end) {
             (Some(atom), Some(End::Crossing { atom: usual, .. })) if atom == usual => label,
             (None, None) => label,
             _ => label_of_end(lives, rule, class, atom)?,
         };
         let fate = match change {
-            Some(Change { time, level, .. }) => {
-                Fate::Ends(label, time, level.map_or(0.0, |(_, level)| level))
-            }
+            Some(change) => Fate::Ends(label, change.time, change.level().map_or(0.0, |(_, level)| level)),
             None => Fate::Lasts(label),
         };
         Some((fate, lasting))

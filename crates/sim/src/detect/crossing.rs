@@ -78,7 +78,7 @@ impl Function for Difference<'_, '_> {
     fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
         // The difference of values that move together may vary much less than each of them does.
         if let ZeroCrossing::Search { sum: Some(sum), .. } =
-            &self.path.rule.zero_crossings(self.path.state.solve)[self.atom]
+            &self.path.rule.zero_crossings(self.path.state.solve.get())[self.atom]
             && let Some(bounds) = self.path.sum_over(sum, lo, hi)
         {
             return bounds;
@@ -150,12 +150,12 @@ pub fn needs_search(state: &State, rule: &Rule) -> bool {
         !is_unreachable(rule, state, atom)
             && matches!(location_method(crossing, state), LocationMethod::Search)
     };
-    rule.zero_crossings(state.solve).iter().enumerate().any(searched)
+    rule.zero_crossings(state.solve.get()).iter().enumerate().any(searched)
 }
 
 /// True if the analysis of the model has proven that an atom keeps its sign under the active equations.
 pub(super) fn is_unreachable(rule: &Rule, state: &State, atom: usize) -> bool {
-    state.solve.is_some_and(|s| rule.solves[s].unreachable[atom])
+    state.solve.get().is_some_and(|s| rule.solves[s].unreachable[atom])
 }
 
 /// How the crossings of an atom are located.
@@ -290,7 +290,7 @@ impl CrossingDetector {
         if !path.rule.decides_productions(atom) {
             return None;
         }
-        let (variable, level) = match &path.rule.zero_crossings(path.state.solve)[atom] {
+        let (variable, level) = match &path.rule.zero_crossings(path.state.solve.get())[atom] {
             ZeroCrossing::Formula { variable, level } => (*variable, self.level(path, level)),
             ZeroCrossing::Search { level: Some((variable, level)), .. } => {
                 (*variable, self.level(path, level) + 0.0)
@@ -346,7 +346,7 @@ impl CrossingDetector {
         let t = path.rule.time_variable();
         let trajectory = path.state.trajectories.get(variable);
         let start = trajectory.map_or(0.0, |_| path.world.tree.parameters(path.state.id)[variable]);
-        let clause = path.state.solve.map(|s| &path.rule.solves[s]);
+        let clause = path.state.solve.get().map(|s| &path.rule.solves[s]);
         let (values, scratch, rates) = (&mut self.values, &mut self.scratch, &mut self.rates);
         let exact = || {
             path.start(values);

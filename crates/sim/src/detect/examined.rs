@@ -152,8 +152,8 @@ impl<'p> ExaminedStep<'p> {
         conditions: Conditions<'p>,
     ) -> Option<ExaminedStep<'p>> {
         let state = world.state(id)?;
-        let rule = &conditions.rules[state.rule?];
-        let solve = &rule.solves[state.solve?];
+        let rule = &conditions.rules[state.rule.get()?];
+        let solve = &rule.solves[state.solve.get()?];
         Some(ExaminedStep { world, conditions, state, rule, solve, start, end, stages, own: None })
     }
 

@@ -203,7 +203,7 @@ impl PulseDetector {
         reader: Option<Reader<'_, 'p>>,
     ) -> PulseFinding {
         let Some(state) = step.world.state(id) else { return PulseFinding::Clear };
-        let Some((rule, solve)) = state.rule.zip(state.solve) else { return PulseFinding::Clear };
+        let Some((rule, solve)) = state.rule.get().zip(state.solve.get()) else { return PulseFinding::Clear };
         let rule = &step.conditions.rules[rule];
         let (solve, terms) = (&rule.solves[solve], &rule.solves[solve].pulses.values);
         let follows =

@@ -43,7 +43,7 @@ impl Outlook<'_> {
         }
         let end = self.solution.end;
         let are_formulas_free = state.free_until - end.to_f64() > 2.0 * LATER * end.resolution();
-        rule.zero_crossings(state.solve).iter().enumerate().all(|(atom, crossing)| {
+        rule.zero_crossings(state.solve.get()).iter().enumerate().all(|(atom, crossing)| {
             is_unreachable(rule, state, atom)
                 || match location_method(crossing, state) {
                     LocationMethod::Never => true,
@@ -58,7 +58,7 @@ impl Outlook<'_> {
     /// The time before which no variable with a formula meets its level: see [`State::free_until`].
     pub fn free_until(&self) -> f64 {
         let Outlook { state, rule, .. } = self;
-        let atoms = rule.zero_crossings(state.solve).iter().enumerate();
+        let atoms = rule.zero_crossings(state.solve.get()).iter().enumerate();
         let meetings =
             atoms.filter(|(atom, _)| !is_unreachable(rule, state, *atom)).filter_map(|(_, crossing)| {
                 match location_method(crossing, state) {

@@ -104,7 +104,7 @@ impl CrossingDetector {
         }
         let mut now = Signs::from_slice(&state.signs);
         for change in state.next.changes() {
-            now[change.atom] = change.after;
+            now[change.atom()] = change.after;
         }
         let error = path.error();
         let mut search =
@@ -124,7 +124,7 @@ impl Search<'_, '_> {
     fn track_atoms(&mut self) {
         let (path, rule, state) = (self.path, self.path.rule, self.path.state);
         let mut measured = false;
-        for (atom, crossing) in rule.zero_crossings(state.solve).iter().enumerate() {
+        for (atom, crossing) in rule.zero_crossings(state.solve.get()).iter().enumerate() {
             if is_unreachable(rule, state, atom) {
                 continue;
             }
@@ -198,7 +198,7 @@ impl Search<'_, '_> {
                     let (time, at) = (self.path.start.after(position * self.path.h), Sign::Zero);
                     let after = self.now[atom];
                     result.event = Some(position);
-                    result.touched.push(Change { atom, time, at, after, level: None });
+                    result.touched.push(Change::new(atom, time, [at, after]));
                     result.in_doubt = true;
                     return result;
                 }
@@ -278,7 +278,7 @@ impl Search<'_, '_> {
                 (at[atom], after[atom]) = (crossing.at, crossing.after);
                 let time = if crossing.position <= first.position { first.time } else { crossing.time };
                 let (at, after, level) = (crossing.at, crossing.after, crossing.level);
-                group.push(Change { atom, time, at, after, level });
+                group.push(Change::new(atom, time, [at, after]).at_level(level));
             }
         }
         Coincidence { at, after, group }
@@ -313,7 +313,7 @@ impl Search<'_, '_> {
         for i in 0..self.tracked.len() {
             let TrackedAtom { atom, tolerance, ahead } = &self.tracked[i];
             let (atom, tolerance) = (*atom, *tolerance);
-            if !group.iter().any(|change| change.atom == atom) {
+            if !group.iter().any(|change| change.atom() == atom) {
                 continue;
             }
             let from = ahead.next.map_or(first, |crossing| crossing.position.max(first));

@@ -77,10 +77,10 @@ pub fn matters(rule: &Rule, state: &State, at: &[Sign], after: &[Sign]) -> bool 
         return true;
     }
     // The first `solve` clause whose condition holds is active.
-    if rule.solves.iter().position(|s| holds(&s.guard, after)) != state.solve {
+    if rule.solves.iter().position(|s| holds(&s.guard, after)) != state.solve.get() {
         return true;
     }
-    let Some(solve) = state.solve else { return false };
+    let Some(solve) = state.solve.get() else { return false };
     (rule.solves[solve].switches.iter().zip(&state.switches))
         .any(|(switch, &on)| holds(&switch.condition, after) != on)
 }

@@ -251,7 +251,7 @@ impl EventStage<'_, '_> {
         };
         let zero = |atom: usize| match &state.open {
             Some(open) => open.at[atom] == Sign::Zero,
-            None => state.next.touched().iter().any(|change| change.atom == atom),
+            None => state.next.touched().iter().any(|change| change.atom() == atom),
         };
         residual(rule, fire.produce, zero, self.scratch)
     }

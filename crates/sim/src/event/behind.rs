@@ -43,7 +43,7 @@ struct Question<'r> {
 impl Question<'_> {
     /// True if some production holds, where the touched atoms have such signs.
     fn holds_with(&self, sign: impl Fn(usize) -> Sign) -> bool {
-        let of = |atom: usize| match self.touched.iter().position(|change| change.atom == atom) {
+        let of = |atom: usize| match self.touched.iter().position(|change| change.atom() == atom) {
             Some(place) => sign(place),
             None => self.before[atom],
         };
@@ -66,21 +66,21 @@ impl Question<'_> {
 impl<'m> EventStage<'_, 'm> {
     /// True if the instant of a change of sign has to be put behind a jump.
     fn is_jump(&self, rule: usize, change: &Change) -> bool {
-        let (of_rule, atom) = (&self.setup.model.rules[rule], change.atom);
+        let (of_rule, atom) = (&self.setup.model.rules[rule], change.atom());
         if of_rule.jumping_whole[atom] {
             return true;
         }
         // The sign of zero is zero at an instant only.
         let mut compared = of_rule.produces.iter().flat_map(|produce| produce.guard.atoms());
         of_rule.jumping[atom]
-            && change.level.is_none_or(|(variable, _)| variable >= of_rule.first_aggregate)
+            && change.level().is_none_or(|(variable, _)| variable >= of_rule.first_aggregate)
             && !compared.any(|compared| compared == (atom, Comparison::Equal))
     }
 
     /// When the event of a module takes place whose signs change so, by the numbers of now and of a little later. The signs at the
     /// instant become those by the numbers, where that is now.
     pub(super) fn behind_jumps(&mut self, id: ModuleId, touched: &mut [Change]) -> When {
-        let Some(rule) = self.world.state(id).and_then(|state| state.rule) else { return When::Now };
+        let Some(rule) = self.world.state(id).and_then(|state| state.rule.get()) else { return When::Now };
         if !self.setup.has_jumps[rule] {
             return When::Now;
         }
@@ -122,9 +122,9 @@ impl<'m> EventStage<'_, 'm> {
     /// they are.
     fn level_signs(&mut self, id: ModuleId, rule: usize, touched: &mut [Change]) {
         let of_rule = &self.setup.model.rules[rule];
-        for change in touched.iter_mut().filter(|change| of_rule.jumping[change.atom]) {
-            if change.level.is_none() && change.at == Sign::Zero && !self.is_jump(rule, change) {
-                change.level = self.meeting(id, of_rule, change.atom);
+        for change in touched.iter_mut().filter(|change| of_rule.jumping[change.atom()]) {
+            if change.level().is_none() && change.at == Sign::Zero && !self.is_jump(rule, change) {
+                *change = change.at_level(self.meeting(id, of_rule, change.atom()));
             }
         }
     }
@@ -136,7 +136,7 @@ impl<'m> EventStage<'_, 'm> {
         let mut before = Signs::from_slice(&state.signs);
         let passed = |change: &&Change| change.time.since(self.instant.at) <= 0.0;
         for change in state.next.changes().iter().filter(passed) {
-            before[change.atom] = change.after;
+            before[change.atom()] = change.after;
         }
         Question { rule: &model.rules[rule], before, touched: touched.to_vec(), jumps }
     }
@@ -145,7 +145,8 @@ impl<'m> EventStage<'_, 'm> {
     fn at_the_numbers(&mut self, touched: &mut [Change], jumps: &[bool], now: &[Sign]) -> When {
         let mut is_behind = false;
         for (place, change) in touched.iter_mut().enumerate().filter(|(place, _)| jumps[*place]) {
-            (change.at, change.level) = (now[place], None);
+            *change = change.at_level(None);
+            change.at = now[place];
             if now[place] != Sign::Zero {
                 change.after = now[place];
                 is_behind = true;
@@ -162,7 +163,7 @@ impl<'m> EventStage<'_, 'm> {
         let variables = &mut self.scratch.variables;
         self.world.variables(rule, id, &state.context, self.instant.at, variables);
         put_levels(&self.events.met, (&self.world.tree, id), &state.context, variables);
-        for (variable, level) in touched.iter().filter_map(|change| change.level) {
+        for (variable, level) in touched.iter().filter_map(Change::level) {
             if variable < rule.first_aggregate {
                 variables[variable] = level;
             }
@@ -183,5 +184,5 @@ impl<'m> EventStage<'_, 'm> {
 fn signs(rule: &Rule, touched: &[Change], variables: &[f64], registers: &mut Vec<f64>) -> Vec<Sign> {
     let mut sides = vec![0.0; rule.sides.outputs()];
     rule.sides.eval(variables, registers, &mut sides);
-    touched.iter().map(|change| Sign::of(sides[2 * change.atom] - sides[2 * change.atom + 1])).collect()
+    touched.iter().map(|change| Sign::of(sides[2 * change.atom()] - sides[2 * change.atom() + 1])).collect()
 }

@@ -52,7 +52,7 @@ impl EventStage<'_, '_> {
         let mut changed = false;
         for &id in &self.events.opened {
             let Some(state) = self.world.state_mut(id) else { continue };
-            let Some((rule, solve)) = state.rule.zip(state.solve) else { continue };
+            let Some((rule, solve)) = state.rule.get().zip(state.solve.get()) else { continue };
             let clause = &self.setup.model.rules[rule].solves[solve];
             if clause.algebraic.is_empty() || state.open.as_ref().is_none_or(|open| open.flow.is_some()) {
                 continue;
@@ -106,17 +106,17 @@ impl EventStage<'_, '_> {
         let mut wanted: Vec<ModuleId> = Vec::new();
         for &id in self.events.opened.iter().chain(&self.events.ready) {
             let Some(state) = self.world.state_mut(id) else { continue };
-            let Some(rule) = state.rule.map(|r| &self.setup.model.rules[r]) else { continue };
+            let Some(rule) = state.rule.get().map(|r| &self.setup.model.rules[r]) else { continue };
             let elsewhere = state.open.as_ref().is_none_or(|open| open.flow.is_none());
             if !chosen && !elsewhere {
                 continue;
             }
-            if state.solve.is_none() && !chosen {
+            if state.solve.get().is_none() && !chosen {
                 // The equations that it is going to have, as far as can be told.
                 let signs = &state.signs;
                 let may = |guard: &dlsys_model::Condition| guard.judge(|i| signs[i]) != Truth::No;
-                state.solve = rule.solves.iter().position(|s| may(&s.guard));
-                let switches = state.solve.map_or(&[][..], |s| &rule.solves[s].switches);
+                state.solve = rule.solves.iter().position(|s| may(&s.guard)).into();
+                let switches = state.solve.get().map_or(&[][..], |s| &rule.solves[s].switches);
                 state.switches = switches.iter().map(|s| may(&s.condition)).collect();
             }
             wanted.push(id);
@@ -142,7 +142,8 @@ impl EventStage<'_, '_> {
     fn take_over(&mut self, solved: &Solved) -> Changed {
         let Solved { places, before, values } = solved;
         let mut changed = Changed::default();
-        for ((&(_, id, parameter), &before), &value) in places.iter().zip(before).zip(values) {
+        for ((of, &before), &value) in places.iter().zip(before).zip(values) {
+            let id = of.module;
             let state = self.world.state(id).expect("wanted");
             let in_question = self.events.ready.contains(&id) && state.open.is_none();
             let elsewhere = in_question || state.open.as_ref().is_some_and(|open| open.flow.is_none());
@@ -153,8 +154,7 @@ impl EventStage<'_, '_> {
                 continue;
             }
             self.world.rebase(id, self.instant.at);
-            let place = self.world.tree.places(id).start + parameter;
-            self.world.tree.set_value(place, value);
+            self.world.tree.set_value(of.place as usize, value);
             if jumps || step > 1e-12 * size {
                 changed.all.push(id);
             }
@@ -170,7 +170,7 @@ impl EventStage<'_, '_> {
     /// that it reads, have jumped.
     fn place_again(&mut self, id: ModuleId, own: bool, jumps: bool) -> bool {
         let Some(state) = self.world.state(id) else { return false };
-        let Some(rule) = state.rule else { return false };
+        let Some(rule) = state.rule.get() else { return false };
         let compiled = &self.setup.model.rules[rule];
         let is_open = state.open.is_some();
         // Signs that were followed to the instant are valid, unless something has jumped.

@@ -108,7 +108,7 @@ impl EventStage<'_, '_> {
                 return Some(Firing::at(id, class.rule, class.produce()?));
             }
             let state = world.state(id)?;
-            let (rule, open) = (state.rule?, state.open.as_ref()?);
+            let (rule, open) = (state.rule.get()?, state.open.as_ref()?);
             let produce = self.production_at(rule, &open.at)?;
             Some(Firing { id, rule, produce, after: open.behind && self.setup.jumps[rule][produce] })
         }));
@@ -136,6 +136,7 @@ impl EventStage<'_, '_> {
     pub fn start_flows(&mut self) -> Result<(), Error> {
         let mut opened = std::mem::take(&mut self.events.opened);
         opened.append(&mut self.events.ready);
+        clear(&mut self.events.ready);
         for &id in &opened {
             if let Some(state) = self.world.state_mut(id) {
                 state.open = None;
@@ -143,28 +144,29 @@ impl EventStage<'_, '_> {
             }
         }
         // A module that got several rules within the instant is there several times; its trajectory begins once.
-        opened.retain(|id| self.world.state_mut(*id).is_some_and(|state| std::mem::take(&mut state.waits)));
-        for &id in &opened {
-            let Some(state) = self.world.state_mut(id) else { continue };
-            if state.rule.is_some() {
-                state.restarted = self.instant.number;
+        opened.retain(|&id| {
+            let Some(state) = self.world.state_mut(id) else { return false };
+            let begins = std::mem::take(&mut state.waits);
+            if begins && state.rule.get().is_some() {
+                state.restart(self.instant.number);
                 let numeric_only = self.setup.numeric_only;
                 self.flow().start_trajectories(id, numeric_only);
             }
-        }
+            begins
+        });
         if self.setup.looks_around || self.setup.is_algebraic {
             self.note_resting(&opened);
             self.flow().couple(&opened)?;
         }
         for &id in &opened {
-            let state = self.world.state(id).filter(|s| s.rule.is_some() && !s.coupled);
+            let state = self.world.state(id).filter(|s| s.rule.get().is_some() && !s.coupled);
             if state.is_some() {
                 let now = self.instant.at;
                 self.flow().look_ahead(id, now)?;
             }
         }
+        clear(&mut opened);
         self.events.opened = opened;
-        self.events.opened.clear();
         Ok(())
     }
 }

@@ -42,7 +42,9 @@ const MOST_ULPS: u32 = 8;
 /// Gives the variables that meet a level their levels, not roundings of them. Where they `decide` over something that jumps in a successor,
 /// the sides that meet there are equal to the last bit, if they can be: `3.4*x` is 2 where it reaches 2, and not a little less.
 pub fn set_levels(world: &World, fire: &Firing, (rule, decide): (&Rule, bool), scratch: &mut Scratch) {
-    let Some(state) = world.state(fire.id).filter(|state| state.rule == Some(fire.rule)) else { return };
+    let Some(state) = world.state(fire.id).filter(|state| state.rule.get() == Some(fire.rule)) else {
+        return;
+    };
     for &Level { atom, variable, value, after } in state.open.iter().flat_map(|open| &open.levels) {
         if !decide {
             // The time is known to the last digit as it is.

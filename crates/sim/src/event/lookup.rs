@@ -16,10 +16,10 @@ use dlsys_tree::ModuleId;
 /// integrated with its neighbours already, and neither its conditions nor its formulas read them. So its signs, its clause
 /// and its own events stay, and most events of a tissue concern one module, not three.
 fn goes_on(state: &State, rule: &Rule, number: usize, context: &Context) -> bool {
-    if state.rule != Some(number) || !state.coupled || state.open.is_some() {
+    if state.rule.get() != Some(number) || !state.coupled || state.open.is_some() {
         return false;
     }
-    let Some(clause) = state.solve.map(|solve| &rule.solves[solve]) else { return false };
+    let Some(clause) = state.solve.get().map(|solve| &rule.solves[solve]) else { return false };
     // A zero sign may go elsewhere with another neighbour.
     let is_clear = |sign: &Sign| matches!(sign, Sign::Plus | Sign::Minus);
     let (own, all) = (rule.parameters.len(), rule.variables - 2);
@@ -98,28 +98,29 @@ impl EventStage<'_, '_> {
             });
             let state = self.world.state(id);
             let Some(rule) = applies else {
-                if state.is_none_or(|s| s.rule.is_some()) {
+                if state.is_none_or(|s| s.rule.get().is_some()) {
                     self.world.rebase(id, self.instant.at);
                     self.flow().forget(id);
-                    self.world.new_state(id).restarted = self.instant.number;
+                    self.world.new_state(id).restart(self.instant.number);
                     self.world.let_inputs_go_on(model, id, self.instant.at);
                     self.events.ready.push(id);
                 }
                 continue;
             };
             match state {
-                Some(s) if s.rule == Some(rule) && s.context == context => {}
+                Some(s) if s.rule.get() == Some(rule) && s.context == context => {}
                 Some(s) if goes_on(s, &model.rules[rule], rule, &context) => {
                     self.exchange_neighbours(id, &context);
                 }
                 _ => self.take_up(id, rule, &context),
             }
         }
+        clear(&mut to_look);
         self.events.to_look = to_look;
         let world = &self.world;
         self.events
             .opened
-            .retain(|id| world.state(*id).is_some_and(|s| s.rule.is_some()) || world.is_lazy(*id));
+            .retain(|id| world.state(*id).is_some_and(|s| s.rule.get().is_some()) || world.is_lazy(*id));
     }
 
     /// The rule of a module that looks at one whose heir is of the same kind, and nothing else has changed: all that matched
@@ -131,7 +132,7 @@ impl EventStage<'_, '_> {
         context: &mut Context,
     ) -> Option<usize> {
         let ((dead, heir), state) = (heir.filter(|(_, heir)| *heir != id)?, self.world.state(id)?);
-        let rule = state.rule?;
+        let rule = state.rule.get()?;
         context.clone_from(&state.context);
         context.exchange(dead, heir);
         self.neighbours.note(&self.world.tree, id, heir);
@@ -155,7 +156,7 @@ impl EventStage<'_, '_> {
         self.flows.coupled.loosened.extend(left);
         self.flows.coupled.loosened.push(id);
         self.flows.coupled.loosened.extend_from_slice(context);
-        state.exchanged = self.instant.number;
+        state.exchange(self.instant.number);
         state.context.clone_from(context);
     }
 
@@ -167,49 +168,64 @@ impl EventStage<'_, '_> {
     /// The same with new values of some parameters.
     pub fn take_up_with(&mut self, id: ModuleId, rule: usize, context: &Context, given: &[(usize, f64)]) {
         let compiled = &self.setup.model.rules[rule];
-        let is_new = self.world.state(id).is_none();
-        let error = if is_new { 0.0 } else { self.flows.error_of(self.world, id) };
-        self.world.rebase_with(id, self.instant.at, given);
-        let followed = if is_new { None } else { self.signs_followed(id, rule) };
-        let followed = followed.map(|signs| (signs, error));
-        let (mut signs, clear) = self.signs_of_values(id, compiled, context, followed);
-        let before = self.world.state(id);
-        // A limit that is only approached may have been reached by rounding.
-        if let Some(State { rule: Some(last), solve: Some(solve), signs: known, .. }) = before
-            && *last == rule
-        {
-            for (atom, &unreachable) in compiled.solves[*solve].unreachable.iter().enumerate() {
-                if unreachable {
-                    signs[atom] = known[atom];
-                }
+        let (signs, clear, was_open) = match self.world.state(id).is_some() {
+            true => self.signs_anew(id, rule, context, given),
+            false => {
+                self.world.rebase_with(id, self.instant.at, given);
+                let (signs, clear) = self.signs_of_values(id, compiled, context, None);
+                self.world.new_state(id);
+                (signs, clear, false)
             }
-        }
-        let was_open = before.is_some_and(|s| s.open.is_some());
-        if is_new {
-            self.world.new_state(id);
-        }
+        };
         let state = self.world.state_mut(id).expect("just made");
         if state.coupled {
             self.flows.coupled.loosened.extend_from_slice(&state.context);
         }
         state.context = context.clone();
-        state.solve = None;
         state.signs = signs;
         state.switches.clear();
-        state.next = if state.rule == Some(rule) { state.next.again() } else { Default::default() };
-        state.rule = Some(rule);
+        state.next = if state.rule.get() == Some(rule) { state.next.again() } else { Default::default() };
         (state.since, state.free_until) = (self.instant.at, f64::NAN);
         if compiled.is_plain() {
             // Nothing to judge and nothing to choose.
-            state.solve = (!compiled.solves.is_empty()).then_some(0);
+            state.put_under(rule, (!compiled.solves.is_empty()).then_some(0));
             state.open = None;
             self.events.ready.push(id);
             return;
         }
+        state.put_under(rule, None);
         state.place(clear);
         if !was_open {
             self.events.opened.push(id);
         }
+    }
+
+    /// The signs of a rule of a module that has lived under this or another one, by its values of now; whether all are far from zero; and
+    /// whether it is open.
+    fn signs_anew(
+        &mut self,
+        id: ModuleId,
+        rule: usize,
+        context: &Context,
+        given: &[(usize, f64)],
+    ) -> (Signs, bool, bool) {
+        let compiled = &self.setup.model.rules[rule];
+        let error = self.flows.error_of(self.world, id);
+        self.world.rebase_with(id, self.instant.at, given);
+        let followed = self.signs_followed(id, rule).map(|signs| (signs, error));
+        let (mut signs, clear) = self.signs_of_values(id, compiled, context, followed);
+        let state = self.world.state(id).expect("it has lived");
+        // A limit that is only approached may have been reached by rounding.
+        if state.rule.get() == Some(rule)
+            && let Some(solve) = state.solve.get()
+        {
+            for (atom, &unreachable) in compiled.solves[solve].unreachable.iter().enumerate() {
+                if unreachable {
+                    signs[atom] = state.signs[atom];
+                }
+            }
+        }
+        (signs, clear, state.open.is_some())
     }
 
     /// The signs up to now that a module was followed with, if it was under this rule.
@@ -217,7 +233,7 @@ impl EventStage<'_, '_> {
         let now = self.instant.at;
         let state = self.world.state_mut(id)?;
         state.pass_changes(now);
-        (state.rule == Some(rule)).then(|| Signs::from_slice(&state.signs))
+        (state.rule.get() == Some(rule)).then(|| Signs::from_slice(&state.signs))
     }
 
     /// The modules whose rules have contexts, in string order.

@@ -123,7 +123,7 @@ impl EventStage<'_, '_> {
         for i in 0..opened.len() {
             // Most modules that read others read them on one side: to and fro, so that those that are read come first once.
             let id = opened[if number % 2 == 0 { i } else { opened.len() - 1 - i }];
-            if self.world.state(id).is_none_or(|s| s.rule.is_none()) {
+            if self.world.state(id).is_none_or(|s| s.rule.get().is_none()) {
                 continue;
             }
             let (signs, snapped) = self.signs_after(id);
@@ -156,20 +156,20 @@ impl EventStage<'_, '_> {
     fn choose_first(&mut self, opened: &[ModuleId]) {
         for id in opened {
             let Some(state) = self.world.state_mut(*id) else { continue };
-            let Some(rule) = state.rule.map(|r| &self.setup.model.rules[r]) else { continue };
+            let Some(rule) = state.rule.get().map(|r| &self.setup.model.rules[r]) else { continue };
             let entry = open(state);
             entry.tried.clear();
             (entry.flips, entry.chosen) = (0, 0);
             let guess = Signs::from_slice(&entry.guess);
-            state.solve = next_clause(rule, &guess, &[]);
-            state.switches = switches(rule, state.solve, &guess);
+            state.solve = next_clause(rule, &guess, &[]).into();
+            state.switches = switches(rule, state.solve.get(), &guess);
         }
     }
 
     /// The production of an open module that holds at the instant, or else just after it; true if it holds at it.
     fn production_of(&self, id: ModuleId, after: &[Sign]) -> Option<(Firing, bool)> {
         let state = self.world.state(id)?;
-        let rule = state.rule?;
+        let rule = state.rule.get()?;
         if let Some(produce) = self.production_at(rule, &state.open.as_ref()?.at) {
             return Some((Firing::at(id, rule, produce), true));
         }
@@ -181,10 +181,10 @@ impl EventStage<'_, '_> {
     /// True if the equations of a module lead to signs under which they, or none, hold.
     fn is_left_to(&self, id: ModuleId, signs: &[Sign]) -> bool {
         let state = self.world.state(id).expect("open modules have a state");
-        let rule = &self.setup.model.rules[state.rule.expect("open modules have a rule")];
+        let rule = &self.setup.model.rules[state.rule.get().expect("open modules have a rule")];
         match rule.solves.iter().position(|solve| solve.guard.judge(|i| signs[i]) == Truth::Yes) {
             None => true,
-            first => first == state.solve && switches(rule, first, signs) == state.switches,
+            first => first == state.solve.get() && switches(rule, first, signs) == state.switches,
         }
     }
 
@@ -194,22 +194,22 @@ impl EventStage<'_, '_> {
         let reads_anew = !hasty && self.reads_anew(id);
         let choices = self.events.choices + 1;
         let state = self.world.state_mut(id).expect("open modules have a state");
-        let rule = &self.setup.model.rules[state.rule.expect("open modules have a rule")];
+        let rule = &self.setup.model.rules[state.rule.get().expect("open modules have a rule")];
         let entry = state.open.as_mut().expect("open");
         if reads_anew {
             entry.flips = 0;
             entry.tried.clear();
         }
         let first = rule.solves.iter().position(|s| s.guard.judge(|i| signs[i]) == Truth::Yes);
-        if first != state.solve || (first.is_none() && !rule.solves.is_empty()) {
-            entry.tried.extend(state.solve);
+        if first != state.solve.get() || (first.is_none() && !rule.solves.is_empty()) {
+            entry.tried.extend(state.solve.get());
             // Any zero may yet go either way under other equations.
             let any: Signs = entry.at.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect();
             let untried = first.filter(|f| !entry.tried.contains(f));
             match untried.or_else(|| next_clause(rule, &any, &entry.tried)) {
                 Some(next) => {
-                    state.solve = Some(next);
-                    state.switches = switches(rule, state.solve, &signs);
+                    state.solve = Some(next).into();
+                    state.switches = switches(rule, state.solve.get(), &signs);
                     entry.chosen = choices;
                     self.events.choices = choices;
                     self.flows.known_rates.forget(id);
@@ -222,7 +222,7 @@ impl EventStage<'_, '_> {
             }
             return;
         }
-        let wanted = switches(rule, state.solve, &signs);
+        let wanted = switches(rule, state.solve.get(), &signs);
         if wanted != state.switches {
             entry.flips += 1;
             entry.chosen = choices;
@@ -239,7 +239,7 @@ impl EventStage<'_, '_> {
                 let both = at.iter().zip(&signs);
                 let rest: Signs =
                     both.map(|(at, after)| if *at == Sign::Zero { Sign::Zero } else { *after }).collect();
-                state.switches = switches(rule, state.solve, &rest);
+                state.switches = switches(rule, state.solve.get(), &rest);
                 if !smooth {
                     pass.changed = Some((id, signs));
                 }
@@ -276,7 +276,7 @@ impl EventStage<'_, '_> {
     fn choice_of(&self, opened: &[ModuleId]) -> u64 {
         let mut hasher = DefaultHasher::new();
         for state in opened.iter().filter_map(|id| self.world.state(*id)) {
-            (state.solve, &state.switches).hash(&mut hasher);
+            (state.solve.get(), &state.switches).hash(&mut hasher);
         }
         hasher.finish()
     }
@@ -288,12 +288,12 @@ impl EventStage<'_, '_> {
         let is_other = |open: &Open| {
             open.flow
                 .as_ref()
-                .is_none_or(|(solve, switches)| *solve != state.solve || *switches != state.switches)
+                .is_none_or(|(solve, switches)| *solve != state.solve.get() || *switches != state.switches)
         };
         let begins_anew = match &state.open {
             Some(open) => is_other(open),
             // It has got others that need no choice, or none, at this instant.
-            None => state.restarted == self.instant.number || self.instant.at.since(state.since) <= 0.0,
+            None => state.has_restarted(self.instant.number) || self.instant.at.since(state.since) <= 0.0,
         };
         if begins_anew {
             return false;
@@ -327,7 +327,7 @@ impl EventStage<'_, '_> {
     /// zero within the resolution of time.
     fn signs_after(&mut self, id: ModuleId) -> (Signs, bool) {
         let state = self.world.state(id).expect("open modules have a state");
-        let rule = &self.setup.model.rules[state.rule.expect("open modules have a rule")];
+        let rule = &self.setup.model.rules[state.rule.get().expect("open modules have a rule")];
         let known = state.open.as_ref().expect("open");
         let elsewhere = known.flow.is_none();
         if rule.atoms.is_empty() || (known.clear || !elsewhere) && !known.at.contains(&Sign::Zero) {
@@ -420,7 +420,7 @@ impl EventStage<'_, '_> {
 
     fn no_equations(&self, missing: &NoMode) -> Error {
         let id = missing.id;
-        let index = self.world.state(id).and_then(|s| s.rule).expect("open modules have a rule");
+        let index = self.world.state(id).and_then(|s| s.rule.get()).expect("open modules have a rule");
         let rule = &self.setup.model.rules[index];
         let site = self.world.site(self.setup.model, id, index, rule.span, self.instant.at);
         // A life about as short as the resolution of time, at the end of a line of lives: the order of events at its end

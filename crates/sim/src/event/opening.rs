@@ -65,8 +65,8 @@ impl EventStage<'_, '_> {
         let fresh = state.open.is_none();
         let open = state.follow();
         for change in touched {
-            open.at[change.atom] = change.at;
-            open.guess[change.atom] = change.after;
+            open.at[change.atom()] = change.at;
+            open.guess[change.atom()] = change.after;
         }
         if fresh {
             self.events.opened.push(id);
@@ -74,14 +74,14 @@ impl EventStage<'_, '_> {
         self.world.rebase(id, now);
         // Where the instant is known from a level, the value there is that level, not a rounding of it.
         for change in touched {
-            let Some((variable, value)) = change.level else { continue };
+            let Some((variable, value)) = change.level() else { continue };
             let places = self.world.tree.places(id);
             match variable.checked_sub(places.len()) {
                 None => self.world.tree.set_value(places.start + variable, value),
                 Some(of_context) => self.note_level_of_neighbour(id, of_context, value),
             }
             if let Some(open) = self.world.state_mut(id).and_then(|state| state.open.as_mut()) {
-                let (atom, after) = (change.atom, change.after);
+                let (atom, after) = (change.atom(), change.after);
                 open.levels.push(Level { atom, variable, value, after });
             }
         }
@@ -114,7 +114,9 @@ impl EventStage<'_, '_> {
         let mut resting = std::mem::take(&mut self.events.resting);
         for id in resting.drain(..) {
             let state = self.world.state(id);
-            if state.is_some_and(|s| s.rule.is_some() && s.open.is_none() && s.signs.contains(&Sign::Zero)) {
+            if state
+                .is_some_and(|s| s.rule.get().is_some() && s.open.is_none() && s.signs.contains(&Sign::Zero))
+            {
                 self.touch(id, &[]);
             }
         }
@@ -123,12 +125,17 @@ impl EventStage<'_, '_> {
 
     /// Remembers those of the modules that rest on a boundary and have a context.
     pub fn note_resting(&mut self, modules: &[ModuleId]) {
+        if !self.setup.has_conditions {
+            return;
+        }
         for &id in modules {
             let state = self.world.state(id);
             let rests = |s: &State| {
                 // Sides that are constant until the module's own event are not moved by its neighbours.
-                let watch =
-                    s.rule.map_or(&[][..], |rule| self.setup.model.rules[rule].zero_crossings(s.solve));
+                let watch = s
+                    .rule
+                    .get()
+                    .map_or(&[][..], |rule| self.setup.model.rules[rule].zero_crossings(s.solve.get()));
                 let mut atoms = s.signs.iter().zip(watch);
                 atoms.any(|(sign, watch)| *sign == Sign::Zero && !matches!(watch, ZeroCrossing::Constant))
             };
@@ -140,10 +147,10 @@ impl EventStage<'_, '_> {
 
     /// Opens a module whose event it is; None if the event turns out to be a little later.
     pub fn touch_scheduled(&mut self, slot: usize) -> Result<Option<ModuleId>, Error> {
-        let state = self.world.states[slot].as_mut().expect("scheduled");
+        let state = self.world.states.get_mut(slot).expect("scheduled");
         let id = state.id;
         if state.next.kind == NextKind::Doubt {
-            let atom = state.next.touched()[0].atom;
+            let atom = state.next.touched()[0].atom();
             return Err(self.flow().in_doubt(id, atom));
         }
         if state.next.kind == NextKind::Fault {
@@ -163,7 +170,7 @@ impl EventStage<'_, '_> {
         let mut touched = state.next.take_touched();
         let when = self.behind_jumps(id, &mut touched);
         if let When::Later(time) = when {
-            self.world.states[slot].as_mut().expect("scheduled").next.touch(kind, touched);
+            self.world.states.get_mut(slot).expect("scheduled").next.touch(kind, touched);
             self.schedule.schedule(Owner::Module(slot as u32), time);
             return Ok(None);
         }
@@ -204,22 +211,23 @@ impl EventStage<'_, '_> {
         };
         let state = self.world.make_state(id);
         state.renew(id);
-        (state.rule, state.solve, state.signs) = (Some(index), solve, signs);
+        state.put_under(index, solve);
+        state.signs = signs;
         (state.since, state.trajectories) = (now, trajectories);
         let kind = if change.is_none() { NextKind::Nothing } else { NextKind::Event };
         state.next.touch(kind, change.into_iter().collect());
-        state.restarted = self.instant.number;
+        state.restart(self.instant.number);
         true
     }
 
     /// The production of a module whose event was predicted, with its values moved to the event; None if more has to be examined.
     pub fn fire_predicted(&mut self, slot: usize) -> Option<Firing> {
-        let state = self.world.states.get(slot)?.as_ref()?;
+        let state = self.world.states.get(slot)?;
         if !self.setup.fast_path || state.next.kind != NextKind::Event || state.is_numeric() || state.coupled
         {
             return None;
         }
-        let (id, rule) = (state.id, state.rule?);
+        let (id, rule) = (state.id, state.rule.get()?);
         if self.setup.levels_decide[rule] || self.setup.has_jumps[rule] {
             return None;
         }
@@ -229,11 +237,11 @@ impl EventStage<'_, '_> {
         }
         let touched = state.next.touched();
         let at = |i: usize| {
-            touched.iter().find(|change| change.atom == i).map_or(state.signs[i], |change| change.at)
+            touched.iter().find(|change| change.atom() == i).map_or(state.signs[i], |change| change.at)
         };
         let produces = &self.setup.model.rules[rule].produces;
         let produce = produces.iter().position(|p| p.guard.judge(at) == Truth::Yes)?;
-        let levels: SmallVec<[(usize, f64); 2]> = touched.iter().filter_map(|c| c.level).collect();
+        let levels: SmallVec<[(usize, f64); 2]> = touched.iter().filter_map(Change::level).collect();
         self.world.rebase_except(id, self.instant.at, &levels);
         Some(Firing::at(id, rule, produce))
     }

@@ -64,7 +64,7 @@ impl EventStage<'_, '_> {
     /// values have the error `other`.
     fn tie(&mut self, id: ModuleId, other: f64) -> Option<Change> {
         let state = self.world.state(id).filter(|s| s.open.is_none())?;
-        let rule = &self.setup.model.rules[state.rule?];
+        let rule = &self.setup.model.rules[state.rule.get()?];
         if rule.produces.is_empty() || rule.atoms.is_empty() {
             return None;
         }
@@ -88,7 +88,7 @@ impl EventStage<'_, '_> {
         }
         let mut signs = Signs::from_slice(&state.signs);
         for change in state.next.changes().iter().filter(|change| change.time.since(self.instant.at) <= 0.0) {
-            signs[change.atom] = change.after;
+            signs[change.atom()] = change.after;
         }
         let atom = (0..rule.atoms.len()).find(|&atom| {
             error > 0.0
@@ -97,12 +97,6 @@ impl EventStage<'_, '_> {
                 && path.is_integrated(&rule.atom_reads[atom])
                 && self.detector.crossings.is_about_to_meet(&path, atom, signs[atom], factor)
         })?;
-        Some(Change {
-            atom,
-            time: self.instant.at,
-            at: Sign::Zero,
-            after: opposite(signs[atom]),
-            level: None,
-        })
+        Some(Change::new(atom, self.instant.at, [Sign::Zero, opposite(signs[atom])]))
     }
 }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::FlowStage;
 use super::coupled::algebra::AlgebraicError;
 use super::coupled::equations::Equations;
-use super::coupled::rows::{EquationTable, RowAggregate, VariableSource};
+use super::coupled::rows::{ComponentPlace, EquationTable, RowAggregate, VariableSource};
 use super::coupled::system::System;
 use crate::detect::signs::NEAR;
 use crate::error::{Error, Unsolved};
@@ -15,10 +15,9 @@ use dlsys_expr::{Dual, eliminate};
 use dlsys_model::Model;
 use dlsys_tree::{ModuleId, SimTime, Visit};
 
-/// Algebraic parameters at an instant: where each stands, their values before, and those that solve the equations.
+/// Algebraic parameters at an instant: where each belongs, their values before, and those that solve the equations.
 pub struct Solved {
-    /// Place in the tree's values, and owner with its parameter.
-    pub places: Vec<(usize, ModuleId, usize)>,
+    pub places: Vec<ComponentPlace>,
     pub before: Vec<f64>,
     pub values: Vec<f64>,
 }
@@ -26,7 +25,7 @@ pub struct Solved {
 /// True for a module with algebraic parameters that are kept consistent, not only computed on observation.
 pub fn is_algebraic(model: &Model, world: &World, id: ModuleId) -> bool {
     let Some(state) = world.state(id) else { return false };
-    let Some((rule, solve)) = state.rule.zip(state.solve) else { return false };
+    let Some((rule, solve)) = state.rule.get().zip(state.solve.get()) else { return false };
     let algebraic = &model.rules[rule].solves[solve].algebraic;
     (0..algebraic.of.len()).any(|place| !algebraic.is_lazy(place))
 }
@@ -47,7 +46,7 @@ fn instant_system(
     let mut given: Vec<Vec<u32>> = Vec::new();
     for &id in modules {
         let state = world.state(id).expect("a module with equations");
-        let (rule, solve) = state.rule.zip(state.solve).expect("a module with equations");
+        let (rule, solve) = state.rule.get().zip(state.solve.get()).expect("a module with equations");
         let algebraic = &rules[rule].solves[solve].algebraic;
         let first = world.tree.places(id).start;
         values.clear();
@@ -56,7 +55,7 @@ fn instant_system(
         for (place, &parameter) in algebraic.of.iter().enumerate() {
             if algebraic.is_lazy(place) == lazy {
                 number.insert((id, parameter), y.len() as u32);
-                table.places.push((first + parameter, id, parameter));
+                table.places.push(ComponentPlace::new(first, id, parameter));
                 y.push(values[parameter]);
                 places.push(place as u32);
             }
@@ -66,7 +65,7 @@ fn instant_system(
     let mut component = 0;
     for (&id, given) in modules.iter().zip(&given) {
         let state = world.state(id).expect("seen above");
-        let (rule, solve) = state.rule.zip(state.solve).expect("seen above");
+        let (rule, solve) = state.rule.get().zip(state.solve.get()).expect("seen above");
         let compiled = &rules[rule];
         let sources_of = |module: ModuleId| -> Vec<VariableSource> {
             let mut values = Vec::new();
@@ -119,7 +118,7 @@ impl FlowStage<'_, '_> {
         }
         let lazy = |id: ModuleId| {
             let state = self.world.state(id)?;
-            let algebraic = &self.setup.model.rules[state.rule?].solves[state.solve?].algebraic;
+            let algebraic = &self.setup.model.rules[state.rule.get()?].solves[state.solve.get()?].algebraic;
             (0..algebraic.of.len()).any(|place| algebraic.is_lazy(place)).then_some(id)
         };
         let wanted: Vec<ModuleId> = (self.world.tree.walk())
@@ -133,8 +132,8 @@ impl FlowStage<'_, '_> {
         if let Err(fault) = answer {
             return Err(self.unsolved(fault, system.owner(fault.component()), at));
         }
-        for (&(place, ..), &value) in system.table.places.iter().zip(&y) {
-            self.world.tree.set_value(place, value);
+        for (of, &value) in system.table.places.iter().zip(&y) {
+            self.world.tree.set_value(of.place as usize, value);
         }
         Ok(())
     }
@@ -143,9 +142,9 @@ impl FlowStage<'_, '_> {
     pub fn unsolved(&self, fault: AlgebraicError, owner: Option<(ModuleId, usize)>, at: SimTime) -> Error {
         let (id, parameter) = owner.unwrap_or_else(|| (self.flows.anyone(self.world), 0));
         let state = self.world.state(id);
-        let rule = state.and_then(|s| s.rule).unwrap_or(0);
+        let rule = state.and_then(|s| s.rule.get()).unwrap_or(0);
         let compiled = &self.setup.model.rules[rule];
-        let span = state.and_then(|s| s.solve).and_then(|solve| {
+        let span = state.and_then(|s| s.solve.get()).and_then(|solve| {
             let algebraic = &compiled.solves[solve].algebraic;
             let place = algebraic.of.iter().position(|p| *p == parameter)?;
             algebraic.spans.get(place).copied()
@@ -169,7 +168,7 @@ impl FlowStage<'_, '_> {
     pub fn algebraic_rates(&mut self, id: ModuleId, tau: f64, depth: usize, out: &mut [f64]) {
         let model = self.setup.model;
         let Some(state) = self.world.state(id) else { return };
-        let (Some(rule), Some(solve)) = (state.rule, state.solve) else { return };
+        let (Some(rule), Some(solve)) = (state.rule.get(), state.solve.get()) else { return };
         let (compiled, switches) = (&model.rules[rule], state.switches.clone());
         let algebraic = &compiled.solves[solve].algebraic;
         let around: Context = state.context.clone();

@@ -94,7 +94,7 @@ impl<'a> Independent<'a> {
         }
         let (t, age) = (from.to_f64(), from.since(world.tree.birth(state.id)));
         variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
-        let solve = &rule.solves[state.solve.expect("numeric trajectories have equations")];
+        let solve = &rule.solves[state.solve.get().expect("numeric trajectories have equations")];
         let program = if state.numeric_only { &solve.rates } else { &solve.numeric_rates };
         let mut numeric: SmallVec<[usize; 4]> = smallvec::smallvec![0; program.outputs()];
         let mut formulas = SmallVec::new();
@@ -191,7 +191,7 @@ impl FlowStage<'_, '_> {
     /// The experience with which a module makes its next step.
     pub fn experience(&self, id: ModuleId) -> Experience {
         let state = self.world.state(id).expect("a module with a rule");
-        let solve = state.solve.expect("has equations");
+        let solve = state.solve.get().expect("has equations");
         let hint = self.flows.hints[self.world.tree.kind(id).index()][solve];
         let last = state.step.as_ref();
         let (mut control, number, hurdle) = match last {
@@ -217,7 +217,7 @@ impl FlowStage<'_, '_> {
         from: SimTime,
         experience: Experience,
     ) -> Result<f64, Error> {
-        let solve = self.world.state(id).and_then(|state| state.solve).expect("has equations");
+        let solve = self.world.state(id).and_then(|state| state.solve.get()).expect("has equations");
         let Experience { mut control, number, mut hurdle } = experience;
         let rejected = self.log.stats.rejected;
         let dense = self.make_own_step(id, from, &mut control).map_err(|error| {
@@ -280,7 +280,8 @@ impl FlowStage<'_, '_> {
         control: &mut Control,
     ) -> Result<Dense, StepError> {
         let state = self.world.state(id).expect("a module with a rule");
-        let (index, solve) = (state.rule.expect("has a rule"), state.solve.expect("has equations"));
+        let (index, solve) =
+            (state.rule.get().expect("has a rule"), state.solve.get().expect("has equations"));
         let rule = &self.setup.model.rules[index];
         let solve = &rule.solves[solve];
         let mut y = std::mem::take(&mut self.flows.y);
@@ -341,7 +342,7 @@ impl FlowStage<'_, '_> {
     pub fn learn(&mut self, id: ModuleId) {
         let (now, kind) = (self.instant.at, self.world.tree.kind(id).index());
         let Some(state) = self.world.state_mut(id) else { return };
-        let (Some(solve), Some(step)) = (state.solve, &mut state.step) else { return };
+        let (Some(solve), Some(step)) = (state.solve.get(), &mut state.step) else { return };
         if step.live {
             let control = &mut step.control;
             control.foresee(control.last_error, now.since(step.dense.start), now.resolution());
@@ -360,9 +361,9 @@ impl FlowStage<'_, '_> {
         owner: impl Fn(usize) -> Option<(ModuleId, usize)>,
     ) -> Error {
         let (id, parameter) = owner(error.component()).unwrap_or_else(|| (self.flows.anyone(self.world), 0));
-        let index = self.world.state(id).and_then(|s| s.rule).unwrap_or(0);
+        let index = self.world.state(id).and_then(|s| s.rule.get()).unwrap_or(0);
         let rule = &self.setup.model.rules[index];
-        let solve = self.world.state(id).and_then(|s| s.solve);
+        let solve = self.world.state(id).and_then(|s| s.solve.get());
         let span = solve.map_or(rule.span, |s| rule.solves[s].span);
         let mut site = self.world.site(self.setup.model, id, index, span, at);
         let mut values = Vec::new();

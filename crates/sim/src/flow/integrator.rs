@@ -161,6 +161,11 @@ impl Integrator {
         blended
     }
 
+    /// Gives back the memory that only the making of a step takes: see [`Stepper::rest`].
+    pub fn rest(&mut self) {
+        self.stepper.rest();
+    }
+
     /// Makes the end of the step just made the start of the next.
     pub fn advance(&mut self, y: &mut Vec<f64>) {
         self.stepper.advance(y);

@@ -44,8 +44,9 @@ pub fn classify(
             let label = world.lives.intern(class);
             return label.map_or(refused, |label| Newborn { label, ..refused });
         }
-        Some(PredictedEnd::Event { change: Change { atom, after, time, .. }, produce }) => {
-            (Some(End::Crossing { produce, atom, after }), Some(time.to_f64()))
+        Some(PredictedEnd::Event { change, produce }) => {
+            let (atom, after) = (change.atom(), change.after);
+            (Some(End::Crossing { produce, atom, after }), Some(change.time.to_f64()))
         }
         None => (None, None),
     };
@@ -123,13 +124,15 @@ pub fn materialise(
     world.tree.set_label(id, NO_LABEL);
     let state = world.make_state(id);
     state.renew(id);
-    (state.rule, state.solve, state.signs) = (Some(class.rule), class.solve, class.signs);
-    (state.since, state.restarted) = (life.birth, instant.number);
+    state.put_under(class.rule, class.solve);
+    state.signs = class.signs;
+    state.since = life.birth;
+    state.restart(instant.number);
     state.trajectories = life.trajectories.clone();
     match class.end {
         Some(End::AtBirth { .. }) => state.place(false),
         Some(End::Crossing { atom, after, .. }) => {
-            let change = Change { atom, time: life.at, at: Sign::Zero, after, level: life.level };
+            let change = Change::new(atom, life.at, [Sign::Zero, after]).at_level(life.level);
             state.next.touch(NextKind::Event, smallvec![change]);
         }
         None => {}

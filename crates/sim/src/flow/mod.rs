@@ -102,17 +102,17 @@ impl Flows {
         if state.coupled && self.coupled.control.size > 0.0 {
             return self.coupled.control.size;
         }
-        let hint =
-            state.solve.map_or(0.0, |solve| self.hints[world.tree.kind(id).index()][solve].control.size);
+        let hint = state
+            .solve
+            .get()
+            .map_or(0.0, |solve| self.hints[world.tree.kind(id).index()][solve].control.size);
         if hint > 0.0 { hint } else { 1.0 }
     }
 
     /// Some living module: to name one where no more is known.
     pub fn anyone(&self, world: &World) -> ModuleId {
         let named = self.coupled.members.iter().copied().find(|id| world.state(*id).is_some());
-        named
-            .or_else(|| world.states.iter().flatten().find(|s| s.is_alive).map(|s| s.id))
-            .expect("there are modules")
+        named.or_else(|| world.states.iter().find(|s| s.is_alive).map(|s| s.id)).expect("there are modules")
     }
     /// Evaluations of the equations of one module so far.
     pub fn evaluations(&self) -> u64 {
@@ -144,8 +144,8 @@ impl FlowStage<'_, '_> {
     pub fn start_trajectories(&mut self, id: ModuleId, numeric_only: bool) {
         let model = self.setup.model;
         let state = self.world.state(id).expect("a module with a rule");
-        let rule = &model.rules[state.rule.expect("a module with a rule")];
-        let clause = state.solve.map(|s| &rule.solves[s]);
+        let rule = &model.rules[state.rule.get().expect("a module with a rule")];
+        let clause = state.solve.get().map(|s| &rule.solves[s]);
         let Some(solve) = clause.filter(|solve| !solve.of.is_empty() || !solve.algebraic.is_empty()) else {
             self.begin_anew(id, false);
             return;
@@ -202,7 +202,7 @@ impl FlowStage<'_, '_> {
         let model = self.setup.model;
         let who = Owner::Module(id.slot() as u32);
         let state = self.world.state_mut(id).expect("a module with a rule");
-        let rule = &model.rules[state.rule.expect("a module with a rule")];
+        let rule = &model.rules[state.rule.get().expect("a module with a rule")];
         // The steps of coupled modules are not their own.
         let numeric = state.is_numeric() && !state.coupled;
         state.next = state.next.again();
@@ -218,7 +218,7 @@ impl FlowStage<'_, '_> {
             }
         } else if searched {
             let World { tree, states, stretch, .. } = &mut *self.world;
-            let state = states[id.slot()].as_mut().expect("a module with a rule");
+            let state = states.get_mut(id.slot()).expect("a module with a rule");
             let h = if state.window > 0.0 {
                 WIDENING * state.window
             } else {
@@ -249,8 +249,8 @@ impl FlowStage<'_, '_> {
         };
         let state = self.world.state_mut(id).expect("seen above");
         let lasting = limit.is_infinite();
-        let (near, before, index) = (found.near, state.next.near, state.rule);
-        state.next = Next::new(kind, found.touched, found.changes);
+        let (near, before, index) = (found.near, state.next.near, state.rule.get());
+        state.next = Next::new(kind, found.touched, &found.changes);
         (state.next.lasting, state.next.near) = (lasting, near);
         if kind == NextKind::Nothing {
             self.schedule.cancel(who);
@@ -268,7 +268,7 @@ impl FlowStage<'_, '_> {
     pub fn arrest(&mut self, id: ModuleId, at: SimTime) -> Option<()> {
         let model = self.setup.model;
         let state = self.world.state(id)?;
-        let rule = &model.rules[state.rule?];
+        let rule = &model.rules[state.rule.get()?];
         self.world.variables(rule, id, &state.context, at, &mut self.scratch.variables);
         let mut sides = vec![0.0; rule.sides.outputs()];
         rule.sides.eval(&self.scratch.variables, &mut self.scratch.registers, &mut sides);
@@ -280,13 +280,13 @@ impl FlowStage<'_, '_> {
         let touched: SmallVec<[Change; 1]> = (0..rule.atoms.len())
             .filter(signed)
             .filter(near)
-            .map(|atom| Change { atom, time: at, at: Sign::Zero, after: state.signs[atom], level: None })
+            .map(|atom| Change::new(atom, at, [Sign::Zero, state.signs[atom]]))
             .collect();
         if touched.is_empty() {
             return None;
         }
         let state = self.world.state_mut(id)?;
-        state.next = Next::new(NextKind::Event, touched, Vec::new());
+        state.next = Next::new(NextKind::Event, touched, &[]);
         self.schedule.schedule(Owner::Module(id.slot() as u32), at);
         Some(())
     }
@@ -323,11 +323,13 @@ impl FlowStage<'_, '_> {
     /// Removes the state of a module that has been replaced, or has lost its rule.
     pub fn forget(&mut self, id: ModuleId) {
         // Its memory stays for the next module in the slot.
-        if let Some(state) = self.world.state_mut(id) {
+        let World { states, coupled, .. } = &mut *self.world;
+        if let Some(state) = states.get_mut(id.slot()).filter(|state| state.id == id && state.is_alive) {
             state.is_alive = false;
             if state.coupled {
                 self.flows.coupled.reintegrated = true;
                 self.flows.coupled.loosened.extend_from_slice(&state.context);
+                coupled.iter_mut().for_each(|solution| solution.release(&state.trajectories));
             }
             self.schedule.cancel(Owner::Module(id.slot() as u32));
         }

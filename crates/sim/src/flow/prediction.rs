@@ -116,7 +116,7 @@ impl Prediction {
         self.end = match change {
             // If nothing follows from it, the general way searches on.
             Some(change) => {
-                let produce = follows(rule, &self.signs, change.atom)?;
+                let produce = follows(rule, &self.signs, change.atom())?;
                 Some(PredictedEnd::Event { change, produce })
             }
             None => None,
@@ -155,7 +155,7 @@ pub fn first_crossing(
             lasting = None;
             continue;
         }
-        let change = Change { atom, time, at: Sign::Zero, after: opposite(signs[atom]), level };
+        let change = Change::new(atom, time, [Sign::Zero, opposite(signs[atom])]).at_level(level);
         let Some(known) = &mut first else {
             first = Some(change);
             lasting = lasting.and(tau).map(Some);

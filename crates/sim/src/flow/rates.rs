@@ -16,7 +16,7 @@ impl FlowStage<'_, '_> {
     pub fn moving_variables(&mut self, id: ModuleId, tau: f64, out: &mut Vec<Dual<f64>>) {
         out.clear();
         let state = self.world.state(id).expect("open modules have a state");
-        let rule = &self.setup.model.rules[state.rule.expect("open modules have a rule")];
+        let rule = &self.setup.model.rules[state.rule.get().expect("open modules have a rule")];
         let around = state.context.clone();
         self.variables_ahead(rule, id, &around, tau, rule.reads_context, DEPTH, out);
     }
@@ -104,7 +104,7 @@ impl FlowStage<'_, '_> {
         out.resize(self.world.tree.parameters(id).len(), 0.0);
         let model = self.setup.model;
         let Some(state) = self.world.state(id) else { return };
-        let (Some(rule), Some(solve)) = (state.rule, state.solve) else { return };
+        let (Some(rule), Some(solve)) = (state.rule.get(), state.solve.get()) else { return };
         let solve = &model.rules[rule].solves[solve];
         if solve.of.is_empty() {
             return self.algebraic_rates(id, tau, depth, out);

@@ -39,7 +39,7 @@ impl FlowStage<'_, '_> {
         else {
             return false;
         };
-        let (next, rule) = (twin.next.clone(), twin.rule);
+        let (next, rule) = (twin.next.clone(), twin.rule.get());
         let near = next.near;
         let own = self.world.state_mut(id).expect("seen above");
         (own.step, own.next) = (Some(step), next);
@@ -56,15 +56,16 @@ impl FlowStage<'_, '_> {
             a.eq(b)
         };
         let same_past = || {
-            let begun =
-                |state: &State| state.step.as_ref().filter(|s| Some(s.solve) == state.solve).map(|s| s.begun);
+            let begun = |state: &State| {
+                state.step.as_ref().filter(|s| Some(s.solve) == state.solve.get()).map(|s| s.begun)
+            };
             a.since == b.since
                 && tree.birth(a.id) == tree.birth(b.id)
                 && begun(a).is_none_or(|begun_of_a| begun(b) == Some(begun_of_a))
         };
         let read_nothing_else = || {
-            let rule = a.rule.map(|rule| &self.setup.model.rules[rule]);
-            rule.zip(a.solve).is_some_and(|(rule, solve)| {
+            let rule = a.rule.get().map(|rule| &self.setup.model.rules[rule]);
+            rule.zip(a.solve.get()).is_some_and(|(rule, solve)| {
                 let programs = [&rule.solves[solve].rates, &rule.sides];
                 rule.aggregates.is_empty() && programs.iter().all(|program| program.stretch().is_infinite())
             })

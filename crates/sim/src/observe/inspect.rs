@@ -59,7 +59,7 @@ impl Simulation<'_> {
         probe.materialise(id);
         probe.flow_stage().refresh(now).ok()?;
         let (rule, solve, context) = match probe.world.state(id) {
-            Some(state) => (state.rule, state.solve, state.context.to_vec()),
+            Some(state) => (state.rule.get(), state.solve.get(), state.context.to_vec()),
             None => (None, None, Vec::new()),
         };
         let mut rates = Vec::new();

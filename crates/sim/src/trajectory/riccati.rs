@@ -7,20 +7,16 @@
 use super::LITTLE;
 use dlsys_expr::{Dual, Interval};
 
-/// A growth law of one parameter, from one start.
+/// A growth law of one parameter, from one start. Modules keep theirs: it has no number that follows from the others in a few
+/// instructions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Riccati {
     /// Rate at the start.
     f: f64,
     d: f64,
     a: f64,
-    /// Half the square root of the discriminant's magnitude.
-    w: f64,
-    /// The roots of the rate in `u` are `-f/p` and `-f/q`: `p + q = 2w` (d ≥ 0; else with the signs of d turned),
-    /// `p q = -a f`.
-    p: f64,
-    q: f64,
-    case: Case,
+    /// Half the square root of the discriminant; if that is negative, minus half the square root of its magnitude.
+    root: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,19 +42,39 @@ impl Riccati {
         // From the original coefficients: b² - 4ac is constant along the solution, and loses fewer digits.
         let discriminant = b * b - 4.0 * a * c;
         let w = 0.5 * discriminant.abs().sqrt();
-        let p = w + 0.5 * d.abs();
-        let case = match () {
-            _ if a == 0.0 => Case::Exponential,
-            _ if discriminant < 0.0 => Case::Complex,
+        Riccati { f, d, a, root: if discriminant < 0.0 { -w } else { w } }
+    }
+
+    fn case(&self) -> Case {
+        match () {
+            _ if self.a == 0.0 => Case::Exponential,
+            _ if self.root < 0.0 => Case::Complex,
             _ => Case::Real,
-        };
-        let q = if p == 0.0 { 0.0 } else { -a * f / p };
-        Riccati { f, d, a, w, p, q, case }
+        }
+    }
+
+    /// Half the square root of the discriminant's magnitude.
+    fn w(&self) -> f64 {
+        self.root.abs()
+    }
+
+    /// The roots of the rate in `u` are `-f/p` and `-f/q`: `p + q = 2w` (d ≥ 0; else with the signs of d turned),
+    /// `p q = -a f`.
+    fn roots(&self) -> (f64, f64) {
+        let p = self.w() + 0.5 * self.d.abs();
+        (p, if p == 0.0 { 0.0 } else { -self.a * self.f / p })
+    }
+
+    /// The one in the denominator of the solution, `1 - fading (1 - exp(-2 w τ)) / (2 w)`.
+    fn fading(&self) -> f64 {
+        let (p, q) = self.roots();
+        if self.d >= 0.0 { p } else { q }
     }
 
     /// `(1 - exp(-2 w τ)) / (2 w)`, which is τ for w = 0.
     fn decay(&self, tau: f64) -> f64 {
-        if self.w == 0.0 { tau } else { -(-2.0 * self.w * tau).exp_m1() / (2.0 * self.w) }
+        let w = self.w();
+        if w == 0.0 { tau } else { -(-2.0 * w * tau).exp_m1() / (2.0 * w) }
     }
 
     /// The displacement at a time since the start. Infinite or NaN from the pole on.
@@ -66,19 +82,18 @@ impl Riccati {
         if self.f == 0.0 || tau == 0.0 {
             return 0.0;
         }
-        match self.case {
+        match self.case() {
             Case::Exponential if self.d == 0.0 => self.f * tau,
             Case::Exponential => self.f * ((self.d * tau).exp_m1() / self.d),
             Case::Real => {
-                let g = self.decay(tau);
+                let (g, w, (p, q)) = (self.decay(tau), self.w(), self.roots());
+                let (still, fading) = if self.d >= 0.0 { (q, p) } else { (p, q) };
                 // Without a pole q is positive, and a sum of positive terms loses nothing.
-                if self.q > 0.0 {
-                    let (still, fading) = if self.d >= 0.0 { (self.q, self.p) } else { (self.p, self.q) };
+                if q > 0.0 {
                     // Computed directly: 1 - 2 w g would cancel.
-                    let left = (-2.0 * self.w * tau).exp();
-                    return self.f * (2.0 * self.w * g) / (still + fading * left);
+                    let left = (-2.0 * w * tau).exp();
+                    return self.f * (2.0 * w * g) / (still + fading * left);
                 }
-                let fading = if self.d >= 0.0 { self.p } else { self.q };
                 let rest = 1.0 - fading * g;
                 if rest <= 0.0 { f64::NAN } else { self.f * g / rest }
             }
@@ -86,8 +101,9 @@ impl Riccati {
                 if tau >= self.pole().unwrap_or(f64::INFINITY) {
                     return f64::NAN;
                 }
-                let (s, c) = (self.w * tau).sin_cos();
-                self.f * s / (self.w * c - 0.5 * self.d * s)
+                let w = self.w();
+                let (s, c) = (w * tau).sin_cos();
+                self.f * s / (w * c - 0.5 * self.d * s)
             }
         }
     }
@@ -95,7 +111,7 @@ impl Riccati {
     /// True if the solution of `x' = c + b x + a x²` falls from `x` to an equilibrium so much smaller that the displacement from `x` has lost the digits
     /// of it.
     pub fn loses_digits(&self, x: f64, c: f64, b: f64, a: f64) -> bool {
-        let equilibrium = match self.case {
+        let equilibrium = match self.case() {
             _ if self.f == 0.0 || x.abs() < FAR => return false,
             // A decay to 0 is computed directly.
             Case::Exponential if self.d >= 0.0 || c == 0.0 => return false,
@@ -103,8 +119,8 @@ impl Riccati {
             Case::Complex => return false,
             Case::Real if self.pole().is_some() => return false,
             // The rate falls where the solution rests. Of the two forms of that root, one does not cancel.
-            Case::Real if b > 0.0 => (-b - 2.0 * self.w) / (2.0 * a),
-            Case::Real if b < 2.0 * self.w => 2.0 * c / (2.0 * self.w - b),
+            Case::Real if b > 0.0 => (-b - 2.0 * self.w()) / (2.0 * a),
+            Case::Real if b < 2.0 * self.w() => 2.0 * c / (2.0 * self.w() - b),
             Case::Real => 0.0,
         };
         equilibrium.abs() * FAR < x.abs()
@@ -112,7 +128,7 @@ impl Riccati {
 
     /// The value at a time since the start, at which it was `x`, for `x' = b x`: not by its displacement.
     pub fn directly(&self, x: f64, tau: f64) -> Option<f64> {
-        let decays = self.case == Case::Exponential && self.f == self.d * x;
+        let decays = self.case() == Case::Exponential && self.f == self.d * x;
         decays.then(|| x * (self.d * tau).exp())
     }
 
@@ -129,27 +145,27 @@ impl Riccati {
 
     /// The coefficients f and d, if the equation is `x' = f + d (x - x(0))`.
     pub fn exponential(&self) -> Option<(f64, f64)> {
-        (self.case == Case::Exponential).then_some((self.f, self.d))
+        (self.case() == Case::Exponential).then_some((self.f, self.d))
     }
 
     /// The time of the pole, or of overflow; None if the solution exists at all times after 0.
     pub fn pole(&self) -> Option<f64> {
-        match self.case {
+        match self.case() {
             _ if self.f == 0.0 => None,
             // exp(d τ) overflows.
             Case::Exponential => (self.d > 0.0)
                 .then(|| (f64::MAX.ln() - (self.f.abs() / self.d).ln()).min(709.782_712_893_384) / self.d),
             Case::Real => {
-                let fading = if self.d >= 0.0 { self.p } else { self.q };
+                let (w, fading) = (self.w(), self.fading());
                 // 1 = fading (1 - E) / (2w)
-                let part = 2.0 * self.w / fading;
-                if self.q > 0.0 || fading <= 0.0 || part > 1.0 {
+                let part = 2.0 * w / fading;
+                if self.roots().1 > 0.0 || fading <= 0.0 || part > 1.0 {
                     return None;
                 }
-                let tau = if self.w == 0.0 { 1.0 / fading } else { -(-part).ln_1p() / (2.0 * self.w) };
+                let tau = if w == 0.0 { 1.0 / fading } else { -(-part).ln_1p() / (2.0 * w) };
                 tau.is_finite().then_some(tau)
             }
-            Case::Complex => Some(self.w.atan2(0.5 * self.d) / self.w),
+            Case::Complex => Some(self.w().atan2(0.5 * self.d) / self.w()),
         }
     }
 
@@ -166,29 +182,29 @@ impl Riccati {
             return None;
         }
         let ratio = rate / self.f;
-        let tau = match self.case {
+        let tau = match self.case() {
             Case::Exponential if self.d == 0.0 => u / self.f,
             Case::Exponential if (0.5..2.0).contains(&ratio) => (u * self.d / self.f).ln_1p() / self.d,
             Case::Exponential => ratio.ln() / self.d,
             Case::Real => {
-                let fading = if self.d >= 0.0 { self.p } else { self.q };
+                let (w, fading) = (self.w(), self.fading());
                 // E = exp(-2 w τ) = rate f / (f + u fading)², and 1 - E = 2 w u / (f + u fading).
                 let below = self.f + u * fading;
                 if below * self.f <= 0.0 {
                     return None;
                 }
-                if self.w == 0.0 {
+                if w == 0.0 {
                     u / below
                 } else {
-                    let gone = 2.0 * self.w * u / below;
+                    let gone = 2.0 * w * u / below;
                     let rest = (rate / below) * (self.f / below);
                     let log = if gone < 0.5 { (-gone).ln_1p() } else { rest.ln() };
-                    -log / (2.0 * self.w)
+                    -log / (2.0 * w)
                 }
             }
             Case::Complex => {
-                let sign = self.f.signum();
-                (self.w * u * sign).atan2((self.f + 0.5 * self.d * u) * sign) / self.w
+                let (w, sign) = (self.w(), self.f.signum());
+                (w * u * sign).atan2((self.f + 0.5 * self.d * u) * sign) / w
             }
         };
         (tau.is_finite() && tau > 0.0).then_some(tau)

@@ -2,8 +2,9 @@
 
 use dlsys_expr::{Dual, Interval};
 use dlsys_ode::{Coefficients, Dense};
-use dlsys_tree::SimTime;
+use dlsys_tree::{SimTime, room};
 
+use crate::trajectory::Trajectory;
 use crate::world::prefetch::fetch;
 
 /// The trajectory of all components from the last common step to its end.
@@ -11,6 +12,11 @@ use crate::world::prefetch::fetch;
 pub struct CoupledSolution {
     /// The common step, then the stretches of reintegrations.
     stretches: Vec<Dense>,
+    /// By stretch, of the first of those that a region follows one after another: the number of its components that do. Each event
+    /// takes over those of several before it, and what nobody follows any more would be most of what is kept.
+    followers: Vec<u32>,
+    /// Stretches that nobody follows: their places are free.
+    free: Vec<u32>,
     /// By component: where it is found. Empty as long as there is the common step only.
     tracks: Vec<Track>,
     pub end: SimTime,
@@ -27,6 +33,13 @@ struct Track {
     component: u32,
 }
 
+impl Track {
+    const NOWHERE: Track = Track { first: 0, count: 0, component: 0 };
+}
+
+/// The stretches of a common step are kept, whoever follows them.
+const ALL: u32 = u32::MAX;
+
 /// A component along a stretch of time that lies within one dense output.
 #[derive(Clone, Copy)]
 pub struct DenseComponent<'c> {
@@ -41,7 +54,8 @@ impl CoupledSolution {
     /// The components of a common step.
     pub fn new(step: Dense) -> CoupledSolution {
         let (end, error) = (step.end, step.error);
-        CoupledSolution { stretches: vec![step], tracks: Vec::new(), end, error }
+        let stretches = vec![step];
+        CoupledSolution { stretches, followers: vec![ALL], free: Vec::new(), tracks: Vec::new(), end, error }
     }
 
     /// The components of a common step that is several stretches.
@@ -52,7 +66,8 @@ impl CoupledSolution {
         let tracks =
             if count == 1 { Vec::new() } else { (0..stretches[0].components() as u32).map(track).collect() };
         let error = stretches.iter().map(|dense| dense.error).fold(0.0, f64::max);
-        CoupledSolution { stretches, tracks, end, error }
+        let followers = vec![ALL; stretches.len()];
+        CoupledSolution { stretches, followers, free: Vec::new(), tracks, end, error }
     }
 
     /// The start of the common step.
@@ -129,24 +144,70 @@ impl CoupledSolution {
 
     /// Adds a component that is not integrated yet.
     pub fn add(&mut self, components: usize) -> usize {
-        for component in self.tracks.len()..components {
-            self.tracks.push(Track { first: 0, count: 1, component: component as u32 });
-        }
-        self.tracks.push(Track { first: 0, count: 0, component: 0 });
+        self.track_all(components);
+        room::push(&mut self.tracks, Track::NOWHERE);
         self.tracks.len() - 1
     }
 
     /// Puts stretches in place of those that some components have followed. `components` are numbered as in the stretches.
     pub fn replace(&mut self, stretches: &mut Vec<Dense>, components: &[u32], all: usize) {
-        for component in self.tracks.len()..all {
-            self.tracks.push(Track { first: 0, count: 1, component: component as u32 });
-        }
-        let (first, count) = (self.stretches.len() as u32, stretches.len() as u32);
+        self.track_all(all);
+        components.iter().for_each(|component| self.leave(self.tracks[*component as usize]));
+        self.error = stretches.iter().map(|dense| dense.error).fold(self.error, f64::max);
+        let count = stretches.len() as u32;
+        let first = match self.free.pop_if(|_| count == 1) {
+            Some(free) => {
+                stretches.drain(..).for_each(|dense| self.stretches[free as usize] = dense);
+                free
+            }
+            None => {
+                let first = self.stretches.len();
+                room::reserve(&mut self.stretches, stretches.len());
+                self.stretches.append(stretches);
+                room::lengthen(&mut self.followers, self.stretches.len(), || 0);
+                first as u32
+            }
+        };
+        self.followers[first as usize] = components.len() as u32;
         for (number, &component) in components.iter().enumerate() {
             self.tracks[component as usize] = Track { first, count, component: number as u32 };
         }
-        self.error = stretches.iter().map(|dense| dense.error).fold(self.error, f64::max);
-        self.stretches.append(stretches);
+    }
+
+    /// Notes that nobody asks for the components of a module any more.
+    pub fn release(&mut self, trajectories: &[Trajectory]) {
+        for trajectory in trajectories {
+            if let Trajectory::Coupled(component) = trajectory
+                && let Some(track) = self.tracks.get_mut(*component as usize)
+            {
+                let before = std::mem::replace(track, Track::NOWHERE);
+                self.leave(before);
+            }
+        }
+    }
+
+    /// Notes that a component goes another way than this from now on.
+    fn leave(&mut self, Track { first, count, .. }: Track) {
+        let followers = &mut self.followers[first as usize];
+        if count == 0 || *followers == ALL {
+            return;
+        }
+        *followers -= 1;
+        if *followers == 0 {
+            self.free.extend(first..first + count);
+            for dense in &mut self.stretches[first as usize..(first + count) as usize] {
+                *dense = Dense::new(dense.start, Some(dense.end), dense.h, 0, Vec::new());
+            }
+        }
+    }
+
+    /// Gives so many components tracks of their own, at least: those that have none follow the common step.
+    fn track_all(&mut self, components: usize) {
+        let mut component = self.tracks.len() as u32;
+        room::lengthen(&mut self.tracks, components, || {
+            component += 1;
+            Track { first: 0, count: 1, component: component - 1 }
+        });
     }
 }
 
@@ -217,5 +278,42 @@ impl<'c> DenseComponent<'c> {
     fn scaled(&self, Dual { value, rate }: Dual<Interval>) -> Dual<Interval> {
         let s = self.scale;
         Dual { value, rate: Interval { lo: rate.lo * s, hi: rate.hi * s, ..rate } }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A stretch of components that rest at some values, from 0 to 1.
+    fn rest(values: &[f64]) -> Dense {
+        Dense::new(SimTime::ZERO, None, 1.0, 0, values.to_vec())
+    }
+
+    #[test]
+    fn what_nobody_follows_is_given_back_and_all_others_stay() {
+        let mut solution = CoupledSolution::new(rest(&[1.0, 2.0, 3.0]));
+        let replace = |solution: &mut CoupledSolution, values: &[f64], components: &[u32]| {
+            solution.replace(&mut vec![rest(values)], components, 3);
+        };
+        let values = |solution: &CoupledSolution| [0, 1, 2].map(|c| solution.value(c, SimTime::ZERO));
+        replace(&mut solution, &[10.0, 20.0], &[0, 1]);
+        replace(&mut solution, &[200.0, 300.0], &[1, 2]);
+        assert_eq!(values(&solution), [10.0, 200.0, 300.0].map(Some));
+        assert!(solution.free.is_empty(), "the first component still follows the first stretch");
+        // The stretch that it leaves is followed by nobody, and the new one takes its place.
+        replace(&mut solution, &[100.0], &[0]);
+        assert_eq!((solution.free.len(), solution.stretches.len()), (0, 3));
+        replace(&mut solution, &[3000.0], &[2]);
+        assert_eq!((solution.free.len(), solution.stretches.len()), (0, 4));
+        assert_eq!(values(&solution), [100.0, 200.0, 3000.0].map(Some));
+        // A module that dies follows nothing.
+        solution.release(&[Trajectory::Rest, Trajectory::Coupled(1)]);
+        assert_eq!(values(&solution), [Some(100.0), None, Some(3000.0)]);
+        assert_eq!(solution.free.len(), 1);
+        // Several stretches end to end take places of their own.
+        solution.replace(&mut vec![rest(&[5.0]), rest(&[6.0])], &[0], 3);
+        assert_eq!([0.0, 1.0].map(|t| solution.value(0, SimTime::new(t))), [5.0, 6.0].map(Some));
+        assert_eq!((solution.free.len(), solution.stretches.len()), (2, 6));
     }
 }

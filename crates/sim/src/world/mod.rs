@@ -1,7 +1,7 @@
 //! The world: the modules of the structure and how their parameters move.
 //!
 //! - [`World`]: the tree, the states of materialised modules, the lives of lazy ones, the solution of the coupled ones
-//! - [`state`]: rule, clause, signs, trajectories and next event of one module
+//! - [`state`], [`states`]: rule, clause, signs, trajectories and next event of one module, and of all of them
 //! - [`path`], [`course`]: the variables of a rule along a stretch of time, and at one instant after another
 //! - [`prefetch`]: memory that is asked for before it is read
 //! - [`context`], [`neighbours`]: the modules that a rule reads, and the modules that read one
@@ -16,6 +16,7 @@ pub mod new_modules;
 pub mod path;
 pub mod prefetch;
 pub mod state;
+pub mod states;
 
 use crate::error::{Error, Site};
 use crate::trajectory::Trajectory;
@@ -27,6 +28,7 @@ use dlsys_tree::{Lineage, ModuleId, SimTime, Tree, Visit};
 use life::Lives;
 use smallvec::SmallVec;
 use state::State;
+use states::States;
 
 /// The instant under examination: that of the last event, or that of an observation.
 #[derive(Clone, Copy, Debug, Default)]
@@ -41,8 +43,8 @@ pub struct Instant {
 pub struct World {
     /// Its values are those at the start of each trajectory.
     pub tree: Tree,
-    /// By slot of the tree, as far as there are any; None for modules without rules, and for lazy ones.
-    pub states: Vec<Option<Box<State>>>,
+    /// Modules without rules have none, and lazy ones.
+    pub states: States,
     /// Lazy modules: their labels in the tree are numbers of life classes.
     pub lives: Lives,
     /// How the coupled modules move.
@@ -62,7 +64,7 @@ impl World {
         let (widths, arities) = (kinds().map(|k| k.width() as u32), kinds().map(|k| k.arity as u32));
         World {
             tree: Tree::new(widths.collect(), arities.collect()),
-            states: Vec::new(),
+            states: States::default(),
             lives: Lives::new(model, kinds_with_context),
             coupled: None,
             structure: 0,
@@ -80,27 +82,22 @@ impl World {
 
     /// The state of a living module that has one.
     pub fn state(&self, id: ModuleId) -> Option<&State> {
-        self.states.get(id.slot())?.as_deref().filter(|s| s.id == id && s.is_alive)
+        self.states.get(id.slot()).filter(|s| s.id == id && s.is_alive)
     }
 
     pub fn state_mut(&mut self, id: ModuleId) -> Option<&mut State> {
-        self.states.get_mut(id.slot())?.as_deref_mut().filter(|s| s.id == id && s.is_alive)
+        self.states.get_mut(id.slot()).filter(|s| s.id == id && s.is_alive)
     }
 
     /// The memory for a module's state; it may be that of another, dead one.
     pub fn make_state(&mut self, id: ModuleId) -> &mut State {
-        let slot = id.slot();
-        while self.states.len() <= slot {
-            self.states.push(None);
-        }
-        self.states[slot].get_or_insert_with(|| Box::new(State::new(id)))
+        self.states.make(id)
     }
 
     /// Gives a module an empty state.
     pub fn new_state(&mut self, id: ModuleId) -> &mut State {
-        match self.states.get_mut(id.slot()) {
-            Some(Some(state)) => **state = State::new(id),
-            _ => return self.make_state(id),
+        if let Some(state) = self.states.get_mut(id.slot()) {
+            *state = State::new(id);
         }
         self.make_state(id)
     }
@@ -114,7 +111,7 @@ impl World {
     pub fn rule_and_clause(&self, id: ModuleId) -> (Option<usize>, Option<usize>) {
         match self.lives.get(self.tree.label(id)) {
             Some(class) => (Some(class.rule), class.solve),
-            None => self.state(id).map_or((None, None), |s| (s.rule, s.solve)),
+            None => self.state(id).map_or((None, None), |s| (s.rule.get(), s.solve.get())),
         }
     }
 
@@ -284,7 +281,7 @@ impl World {
             return self.site(model, id, class.rule, span, at);
         }
         let kind = model.kinds.get(self.tree.kind(id));
-        let own = self.state(id).and_then(|state| Some((state.rule?, state.solve)));
+        let own = self.state(id).and_then(|state| Some((state.rule.get()?, state.solve.get())));
         let first = || kind.rules.first().or(kind.steps.first()).copied().unwrap_or(0);
         let (rule, solve) = own.unwrap_or_else(|| (first(), None));
         let Some(found) = model.rules.get(rule) else { return site_of_axiom(at.to_f64()) };

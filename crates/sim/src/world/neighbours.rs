@@ -16,7 +16,7 @@ use crate::world::World;
 use crate::world::prefetch::fetch;
 use crate::world::state::State;
 use dlsys_model::{KindId, Model};
-use dlsys_tree::{ModuleId, Tree};
+use dlsys_tree::{ModuleId, Tree, room};
 
 /// A module with more neighbours than this is taken to read all that it has looked at.
 const MANY: usize = 32;
@@ -40,7 +40,7 @@ impl From<Option<ModuleId>> for Link {
 const LEFT: usize = 0;
 const RIGHT: usize = 1;
 
-/// What is kept in a slot of the tree: 64 bytes, because an event reads it for all modules around it, and they are anywhere
+/// What is kept in a slot of the tree: 48 bytes, because an event reads it for all modules around it, and they are anywhere
 /// in memory.
 #[derive(Clone, Debug)]
 struct Around {
@@ -50,7 +50,7 @@ struct Around {
     known: [Known; 2],
     /// The neighbours on the sides where there are known ones.
     neighbours: [ModuleId; 2],
-    lookers: SmallVec<[ModuleId; 4]>,
+    lookers: SmallVec<[ModuleId; 2]>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -133,11 +133,8 @@ impl Forwards {
 impl Neighbours {
     /// What is kept in the slot of a module, maybe of an earlier one.
     fn slot(&mut self, id: ModuleId) -> &mut Around {
-        let slot = id.slot();
-        if self.around.len() <= slot {
-            self.around.resize_with(slot + 1, || Around::new(id));
-        }
-        &mut self.around[slot]
+        room::lengthen(&mut self.around, id.slot() + 1, || Around::new(id));
+        &mut self.around[id.slot()]
     }
 
     fn near(&mut self, id: ModuleId) -> &mut Around {
@@ -214,10 +211,12 @@ impl Neighbours {
             return;
         }
         if lookers.len() == lookers.capacity() {
-            // Dead lookers and duplicates.
-            lookers.sort_unstable();
-            lookers.dedup();
-            lookers.retain(|id| tree.is_alive(*id));
+            lookers.retain(|id| *id != looker && tree.is_alive(*id));
+            if lookers.len() == lookers.capacity() {
+                // Duplicates.
+                lookers.sort_unstable();
+                lookers.dedup();
+            }
         }
         lookers.push(looker);
     }
@@ -341,6 +340,6 @@ impl Neighbours {
 /// True if the equations or conditions of a module that has looked at another read something of it that may change.
 pub fn reads(model: &Model, state: &State, seen: ModuleId) -> bool {
     // A module that has looked at many has looked at children, and reads them.
-    state.rule.is_some_and(|rule| model.rules[rule].reads_context)
+    state.rule.get().is_some_and(|rule| model.rules[rule].reads_context)
         && (state.context.len() > MANY || state.context.contains(&seen))
 }

@@ -25,12 +25,12 @@ pub fn prefetch(world: &World, visited: &[ModuleId], at: usize) {
         return;
     }
     if let Some(id) = visited.get(at + 2 * AHEAD) {
-        // The pointer to the state has to be prefetched before the state, the place of the values before the values.
-        world.states.get(id.slot()).into_iter().for_each(fetch);
+        // The place of the state has to be prefetched before the state, the place of the values before the values.
+        world.states.place(id.slot()).into_iter().for_each(fetch);
         world.tree.record(id.slot()).into_iter().for_each(fetch);
     }
     if let Some(&id) = visited.get(at + AHEAD) {
-        world.states.get(id.slot()).and_then(Option::as_deref).into_iter().for_each(fetch);
+        world.states.get(id.slot()).into_iter().for_each(fetch);
         world.tree.parameters(id).first().into_iter().for_each(fetch);
     }
 }
@@ -42,19 +42,44 @@ pub fn prefetch_events(world: &World, neighbours: &Neighbours, mut soon: impl It
         return;
     }
     let locate = |slot: usize| {
-        world.states.get(slot).into_iter().for_each(fetch);
+        world.states.place(slot).into_iter().for_each(fetch);
         neighbours.prefetch(slot);
     };
     if let Some(next) = soon.next() {
-        world.states.get(next as usize).and_then(Option::as_deref).into_iter().for_each(fetch);
+        world.states.get(next as usize).into_iter().for_each(fetch);
         neighbours.beside(next as usize).for_each(|id| locate(id.slot()));
     }
     soon.for_each(|slot| locate(slot as usize));
 }
 
+/// What a walk in string order comes to next, by a list of modules that were in that order before: each link of the walk would wait for
+/// memory, because it says where the next one is.
+pub struct Guide<'b> {
+    before: &'b [ModuleId],
+    passed: usize,
+}
+
+impl Guide<'_> {
+    pub fn new<'b>(world: &World, before: &'b [ModuleId]) -> Guide<'b> {
+        Guide { before: if is_large(world) { before } else { &[] }, passed: 0 }
+    }
+
+    /// The walk has come to a module, one of the list or a new one between those.
+    #[inline]
+    pub fn pass(&mut self, world: &World, id: ModuleId) {
+        let Some(known) = self.before.get(self.passed) else { return };
+        if *known == id || !world.tree.is_alive(*known) {
+            self.passed += 1;
+        }
+        if let Some(next) = self.before.get(self.passed + 2 * AHEAD) {
+            world.tree.record(next.slot()).into_iter().for_each(fetch);
+        }
+    }
+}
+
 /// True if there are so many states that the caches do not hold them.
 pub fn is_large(world: &World) -> bool {
-    world.states.len() >= FEW
+    world.states.slots() >= FEW
 }
 
 /// Prefetches all cache lines of a value.

@@ -18,10 +18,11 @@ pub struct State {
     pub id: ModuleId,
     /// False when the module has been replaced, and its memory waits for another.
     pub is_alive: bool,
-    /// The rule that applies; None where no rule's context is there.
-    pub rule: Option<usize>,
+    /// The rule that applies; none where no rule's context is there.
+    pub rule: Index,
+    /// The active clause of it.
+    pub solve: Index,
     pub context: Context,
-    pub solve: Option<usize>,
     /// Conditions inside the active equations.
     pub switches: Switches,
     /// The sign of each atom of the rule, just after the last instant at which it was examined.
@@ -48,10 +49,26 @@ pub struct State {
     pub open: Option<Box<Open>>,
     /// Its trajectories are about to begin.
     pub waits: bool,
-    /// Number of the instant at which its trajectories last began.
-    pub restarted: u64,
-    /// Number of the instant at which it last got other neighbours, without anything else that changed.
-    pub exchanged: u64,
+    /// What changed at the last instant that changed something: its number, four times, and in the last two bits what it was.
+    changed: u64,
+}
+
+/// An index, or none: in a quarter of the room of an `Option<usize>`, because there are millions of states.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Index(u32);
+
+impl Index {
+    const NONE: Index = Index(u32::MAX);
+
+    pub fn get(self) -> Option<usize> {
+        (self != Index::NONE).then_some(self.0 as usize)
+    }
+}
+
+impl From<Option<usize>> for Index {
+    fn from(index: Option<usize>) -> Index {
+        index.map_or(Index::NONE, |index| Index(index as u32))
+    }
 }
 
 /// A step, or a window of formulas, of one module.
@@ -99,10 +116,10 @@ pub struct Next {
 /// The changes of signs up to the next entry of the schedule.
 #[derive(Clone, Debug, Default)]
 struct Ahead {
-    /// Signs that are zero then.
-    touched: SmallVec<[Change; 1]>,
-    /// Signs that change before then, without consequence.
-    changes: Vec<Change>,
+    /// Signs that are zero then, and behind them those that change before then, without consequence.
+    changes: SmallVec<[Change; 1]>,
+    /// The number of the former.
+    touched: u32,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -121,11 +138,11 @@ pub enum NextKind {
 }
 
 impl Next {
-    pub fn new(kind: NextKind, touched: SmallVec<[Change; 1]>, changes: Vec<Change>) -> Next {
-        let has_changes = !changes.is_empty();
-        let is_known = !touched.is_empty() || has_changes;
-        let ahead = is_known.then(|| Box::new(Ahead { touched, changes }));
-        Next { kind, has_changes, ahead, ..Next::default() }
+    pub fn new(kind: NextKind, touched: SmallVec<[Change; 1]>, changes: &[Change]) -> Next {
+        let mut next = Next::default();
+        next.touch(kind, touched);
+        next.add_changes(changes);
+        next
     }
 
     /// Nothing known, of a module that goes on.
@@ -137,52 +154,105 @@ impl Next {
     fn clear(&mut self) {
         (self.kind, self.lasting, self.near, self.has_changes) = (NextKind::Nothing, false, 0, false);
         if let Some(ahead) = &mut self.ahead {
-            ahead.touched.clear();
             ahead.changes.clear();
+            ahead.touched = 0;
         }
     }
 
     /// Signs that are zero then.
     pub fn touched(&self) -> &[Change] {
-        self.ahead.as_ref().map_or(&[], |ahead| &ahead.touched)
+        self.ahead.as_ref().map_or(&[], |ahead| &ahead.changes[..ahead.touched as usize])
     }
 
     /// Takes the signs that are zero then out.
     pub fn take_touched(&mut self) -> SmallVec<[Change; 1]> {
-        self.ahead.as_mut().map(|ahead| std::mem::take(&mut ahead.touched)).unwrap_or_default()
+        let Some(ahead) = &mut self.ahead else { return SmallVec::new() };
+        let touched = std::mem::take(&mut ahead.touched) as usize;
+        match self.has_changes {
+            true => ahead.changes.drain(..touched).collect(),
+            false => std::mem::take(&mut ahead.changes),
+        }
     }
 
     /// Makes these the signs that are zero then.
     pub fn touch(&mut self, kind: NextKind, touched: SmallVec<[Change; 1]>) {
         self.kind = kind;
-        if !touched.is_empty() || self.ahead.is_some() {
-            self.ahead.get_or_insert_default().touched = touched;
+        if touched.is_empty() && self.ahead.is_none() {
+            return;
         }
+        let count = touched.len() as u32;
+        let ahead = self.ahead.get_or_insert_default();
+        match self.has_changes {
+            true => {
+                ahead.changes.drain(..ahead.touched as usize);
+                ahead.changes.insert_from_slice(0, &touched);
+            }
+            false => ahead.changes = touched,
+        }
+        ahead.touched = count;
     }
 
     /// Signs that change before then, without consequence.
     pub fn changes(&self) -> &[Change] {
-        self.ahead.as_ref().filter(|_| self.has_changes).map_or(&[], |ahead| &ahead.changes)
+        let ahead = self.ahead.as_ref().filter(|_| self.has_changes);
+        ahead.map_or(&[], |ahead| &ahead.changes[ahead.touched as usize..])
     }
 
     /// Adds such changes.
-    pub fn add_changes(&mut self, changes: Vec<Change>) {
+    pub fn add_changes(&mut self, changes: &[Change]) {
         if !changes.is_empty() {
-            self.ahead.get_or_insert_default().changes.extend(changes);
+            self.ahead.get_or_insert_default().changes.extend_from_slice(changes);
             self.has_changes = true;
         }
     }
+
+    /// Takes out those of them that come before a time, and calls a function with each.
+    fn pass_changes(&mut self, until: SimTime, mut pass: impl FnMut(&Change)) {
+        let (true, Some(ahead)) = (self.has_changes, &mut self.ahead) else { return };
+        let (mut place, touched) = (0, ahead.touched);
+        ahead.changes.retain(|change| {
+            let passed = place >= touched && change.time.since(until) <= 0.0;
+            place += 1;
+            if passed {
+                pass(change);
+            }
+            !passed
+        });
+        self.has_changes = ahead.changes.len() > touched as usize;
+    }
 }
 
-/// A sign that changes.
+/// A sign that changes. Most modules that have events keep one: see [`Index`] for the room that numbers take.
 #[derive(Clone, Copy, Debug)]
 pub struct Change {
-    pub atom: usize,
     pub time: SimTime,
+    atom: u32,
+    variable: Index,
+    level: f64,
     pub at: Sign,
     pub after: Sign,
+}
+
+impl Change {
+    /// An atom whose sign is `at` at a time, and `after` just after it.
+    pub fn new(atom: usize, time: SimTime, [at, after]: [Sign; 2]) -> Change {
+        Change { time, atom: atom as u32, variable: Index::NONE, level: 0.0, at, after }
+    }
+
+    pub fn atom(&self) -> usize {
+        self.atom as usize
+    }
+
     /// The variable that meets a level there, one of the module's parameters or of its neighbours', and the level.
-    pub level: Option<(usize, f64)>,
+    pub fn level(&self) -> Option<(usize, f64)> {
+        self.variable.get().map(|variable| (variable, self.level))
+    }
+
+    /// The same change with such a level.
+    pub fn at_level(self, level: Option<(usize, f64)>) -> Change {
+        let (variable, level) = level.unzip();
+        Change { variable: variable.into(), level: level.unwrap_or(0.0), ..self }
+    }
 }
 
 /// The open questions of a module at the instant under examination.
@@ -219,14 +289,18 @@ pub struct Level {
     pub after: Sign,
 }
 
+/// What may change at an instant.
+const RESTARTED: u64 = 1;
+const EXCHANGED: u64 = 2;
+
 impl State {
     pub fn new(id: ModuleId) -> State {
         State {
             id,
             is_alive: true,
-            rule: None,
+            rule: Index::NONE,
+            solve: Index::NONE,
             context: Context::default(),
-            solve: None,
             switches: SmallVec::new(),
             signs: SmallVec::new(),
             since: SimTime::ZERO,
@@ -240,8 +314,7 @@ impl State {
             next: Next::default(),
             open: None,
             waits: false,
-            restarted: 0,
-            exchanged: 0,
+            changed: 0,
         }
     }
 
@@ -256,6 +329,36 @@ impl State {
         (self.numeric_only, self.coupled) = (false, false);
     }
 
+    /// Notes that its trajectories begin at the instant of this number.
+    pub fn restart(&mut self, number: u64) {
+        self.change(number, RESTARTED);
+    }
+
+    /// True if they have begun then; asked of the present instant only.
+    pub fn has_restarted(&self, number: u64) -> bool {
+        self.changed >> 2 == number && self.changed & RESTARTED != 0
+    }
+
+    /// Notes that it gets other neighbours at the instant of this number, without anything else that changes.
+    pub fn exchange(&mut self, number: u64) {
+        self.change(number, EXCHANGED);
+    }
+
+    /// True if it has got them then; asked of the present instant only.
+    pub fn has_exchanged(&self, number: u64) -> bool {
+        self.changed >> 2 == number && self.changed & EXCHANGED != 0
+    }
+
+    fn change(&mut self, number: u64, what: u64) {
+        let before = if self.changed >> 2 == number { self.changed } else { number << 2 };
+        self.changed = before | what;
+    }
+
+    /// Puts the module under a rule and a clause of it.
+    pub fn put_under(&mut self, rule: usize, solve: Option<usize>) {
+        (self.rule, self.solve) = (Some(rule).into(), solve.into());
+    }
+
     /// True if some parameter is integrated by the module's own steps.
     pub fn is_numeric(&self) -> bool {
         self.trajectories.iter().any(|m| !m.is_formula())
@@ -264,7 +367,7 @@ impl State {
     /// Opens the module as one that was followed along its trajectory.
     pub fn follow(&mut self) -> &mut Open {
         if self.open.is_none() {
-            let flow = Some((self.solve, Switches::from_slice(&self.switches)));
+            let flow = Some((self.solve.get(), Switches::from_slice(&self.switches)));
             let (at, guess) = (Signs::from_slice(&self.signs), Signs::from_slice(&self.signs));
             self.open = Some(Box::new(Open { at, guess, flow, ..Open::default() }));
         }
@@ -280,17 +383,7 @@ impl State {
 
     /// Takes over the signs that have changed without consequence up to an instant.
     pub fn pass_changes(&mut self, until: SimTime) {
-        let (signs, true, Some(ahead)) = (&mut self.signs, self.next.has_changes, &mut self.next.ahead)
-        else {
-            return;
-        };
-        ahead.changes.retain(|change| {
-            let passed = change.time.since(until) <= 0.0;
-            if passed {
-                signs[change.atom] = change.after;
-            }
-            !passed
-        });
-        self.next.has_changes = !ahead.changes.is_empty();
+        let State { next, signs, .. } = self;
+        next.pass_changes(until, |change| signs[change.atom()] = change.after);
     }
 }

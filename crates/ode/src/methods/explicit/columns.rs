@@ -364,7 +364,7 @@ mod tests {
             x * 10f64.powi((seed >> 7) as i32 % 9)
         };
         let mut work = Workspace::default();
-        work.resize(n);
+        work.provide(n, MAX_STAGES);
         for j in 0..n {
             (work.from[j], work.stage[j], work.end[j]) = (random(), random(), random());
             let rests = j % 7 == 3;
@@ -378,7 +378,7 @@ mod tests {
     /// One component of it.
     fn alone(work: &Workspace, j: usize) -> Workspace {
         let mut one = Workspace::default();
-        one.resize(1);
+        one.provide(1, MAX_STAGES);
         (one.from[0], one.stage[0], one.end[0]) = (work.from[j], work.stage[j], work.end[j]);
         one.k.iter_mut().zip(&work.k).for_each(|(one, k)| one[0] = k[j]);
         one.is_sum = vec![work.is_sum[j]];

@@ -116,6 +116,11 @@ impl OneStep for Radau {
         4
     }
 
+    fn stages(&self) -> usize {
+        // Its own are kept elsewhere.
+        2
+    }
+
     fn nodes(&self) -> &[f64] {
         self.stages.as_ref().map_or(&[0.0, 0.5, 1.0], |stages| stages.nodes())
     }

@@ -114,7 +114,7 @@ impl System {
                 prefetch(modules.world, modules.members, at);
             }
             let state = modules.world.state(id).expect("members have states");
-            let (Some(rule), Some(solve)) = (state.rule, state.solve) else { continue };
+            let (Some(rule), Some(solve)) = (state.rule.get(), state.solve.get()) else { continue };
             let clause = &rules[rule].solves[solve];
             let key = ProgramKey { rule, solve, numeric_only: state.numeric_only };
             let place = waiting.iter().position(|(known, _)| *known == key).unwrap_or(waiting.len());

@@ -20,6 +20,13 @@ pub struct Affected {
     pub dependent: Vec<ModuleId>,
 }
 
+impl Affected {
+    fn clear(&mut self) {
+        let Affected { seeds, joined, freed, dependent } = self;
+        [seeds, joined, freed, dependent].into_iter().for_each(clear);
+    }
+}
+
 impl FlowStage<'_, '_> {
     /// Determines the coupled modules, given those that have begun new trajectories, and integrates them from now on.
     ///
@@ -29,6 +36,7 @@ impl FlowStage<'_, '_> {
         let mut affected = std::mem::take(&mut self.flows.coupled.affected);
         self.find_affected(begun, &mut affected);
         let coupled = self.couple_affected(&affected);
+        affected.clear();
         self.flows.coupled.affected = affected;
         coupled
     }
@@ -47,22 +55,20 @@ impl FlowStage<'_, '_> {
             let state = self.world.state_mut(id).expect("seen above");
             state.coupled = false;
             state.pass_changes(now);
-            if state.restarted != self.instant.number {
+            if !state.has_restarted(self.instant.number) {
                 self.world.rebase(id, now);
                 self.start_trajectories(id, self.setup.numeric_only);
                 self.look_ahead(id, now)?;
             }
         }
         self.flows.coupled.reintegrated |= !freed.is_empty();
-        for &id in joined {
-            self.world.state_mut(id).expect("seen above").coupled = true;
-        }
         for &id in seeds {
             let now = self.instant.at;
             let state = self.world.state_mut(id).expect("seen above");
+            state.coupled = true;
             state.pass_changes(now);
             // Closed forms continue as they were, whatever their module reads.
-            if !state.next.lasting || state.restarted == self.instant.number {
+            if !state.next.lasting || state.has_restarted(self.instant.number) {
                 state.next = state.next.again();
             }
         }
@@ -83,44 +89,23 @@ impl FlowStage<'_, '_> {
 
     /// Classifies the modules that have begun new trajectories, and their neighbours.
     fn find_affected(&mut self, begun: &[ModuleId], affected: &mut Affected) {
-        affected.seeds.clear();
-        affected.joined.clear();
-        affected.freed.clear();
-        affected.dependent.clear();
         let mut near = std::mem::take(&mut self.flows.coupled.loosened);
-        // Modules with many neighbours, whose neighbours have been added already.
-        let mut known = HashSet::new();
-        let is_first = self.instant.number == 1;
-        for &id in begun {
-            near.push(id);
-            if is_first {
-                // All modules begin now, the neighbours among them.
-                continue;
-            }
-            self.neighbours.readers(self.world, self.setup.model, id, |reader, context| {
-                near.push(reader);
-                if context.len() < 8 || known.insert(reader) {
-                    near.extend_from_slice(context);
-                }
-            });
-            if let Some(state) = self.world.state(id) {
-                near.extend_from_slice(&state.context);
-            }
+        if self.instant.number == 1 {
+            // All modules begin now, the neighbours among them.
+            near.extend_from_slice(begun);
+        } else {
+            self.find_neighbours(begun, &mut near);
         }
-        let visit = self.flows.coupled.reintegration.begin_visit();
-        near.retain(|id| {
-            let state = self.world.state_mut(*id);
-            state.is_some_and(|state| std::mem::replace(&mut state.visited, visit) != visit)
-        });
         near.sort_unstable();
-        let moved = |id: &ModuleId| self.world.state(*id).is_some_and(|s| s.restarted == self.instant.number);
+        let moved =
+            |id: &ModuleId| self.world.state(*id).is_some_and(|s| s.has_restarted(self.instant.number));
         for &id in &near {
             let Some(state) = self.world.state(id) else { continue };
             let coupled = self.is_coupled(id);
-            let reads = state.rule.is_some_and(|r| self.setup.model.rules[r].reads_context);
-            let has_moved = state.restarted == self.instant.number;
+            let reads = state.rule.get().is_some_and(|r| self.setup.model.rules[r].reads_context);
+            let has_moved = state.has_restarted(self.instant.number);
             let new_input =
-                || reads && (state.exchanged == self.instant.number || state.context.iter().any(moved));
+                || reads && (state.has_exchanged(self.instant.number) || state.context.iter().any(moved));
             if coupled {
                 if !state.coupled {
                     affected.joined.push(id);
@@ -138,12 +123,35 @@ impl FlowStage<'_, '_> {
         self.flows.coupled.loosened = near;
     }
 
+    /// Adds modules that have begun new trajectories, those that read them, and those that are read by either of them, each once.
+    fn find_neighbours(&mut self, begun: &[ModuleId], near: &mut Vec<ModuleId>) {
+        // Modules with many neighbours, whose neighbours have been added already.
+        let mut known = HashSet::new();
+        for &id in begun {
+            near.push(id);
+            self.neighbours.readers(self.world, self.setup.model, id, |reader, context| {
+                near.push(reader);
+                if context.len() < 8 || known.insert(reader) {
+                    near.extend_from_slice(context);
+                }
+            });
+            if let Some(state) = self.world.state(id) {
+                near.extend_from_slice(&state.context);
+            }
+        }
+        let visit = self.flows.coupled.reintegration.begin_visit();
+        near.retain(|id| {
+            let state = self.world.state_mut(*id);
+            state.is_some_and(|state| std::mem::replace(&mut state.visited, visit) != visit)
+        });
+    }
+
     /// True if a module has to be integrated together with neighbours: it reads one that is integrated, or it is
     /// integrated itself and reads a neighbour or is read by one; or if it has algebraic components, which only coupled
     /// equations solve for.
     fn is_coupled(&self, id: ModuleId) -> bool {
         let Some(state) = self.world.state(id) else { return false };
-        let Some(rule) = state.rule else { return false };
+        let Some(rule) = state.rule.get() else { return false };
         let numeric = |id: &ModuleId| self.world.state(*id).is_some_and(|s| s.is_numeric());
         if self.setup.model.rules[rule].reads_context
             && (state.is_numeric() || state.context.iter().any(numeric))
@@ -154,7 +162,7 @@ impl FlowStage<'_, '_> {
             let algebraic = &self.setup.model.rules[rule].solves[s].algebraic;
             (0..algebraic.of.len()).any(|place| algebraic.is_solved(place, state.numeric_only))
         };
-        if state.solve.is_some_and(solved) {
+        if state.solve.get().is_some_and(solved) {
             return true;
         }
         let mut read = false;

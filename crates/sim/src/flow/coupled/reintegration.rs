@@ -39,7 +39,7 @@ use crate::world::neighbours::reads;
 use crate::world::prefetch::{fetch, is_large};
 use crate::world::state::{Control, State};
 use dlsys_ode::Dense;
-use dlsys_tree::{ModuleId, SimTime};
+use dlsys_tree::{ModuleId, SimTime, room};
 use smallvec::SmallVec;
 
 /// The experience of re-integrations, and their working memory: one allocates nothing but its trajectory.
@@ -211,6 +211,7 @@ impl FlowStage<'_, '_> {
         let mut region = std::mem::take(&mut self.flows.coupled.reintegration.region);
         let mut reintegrated = self.solve_again(&mut region, seeds, now, Cause::Event);
         if reintegrated {
+            room::reserve(&mut self.flows.coupled.members, joined.len());
             self.flows.coupled.members.extend_from_slice(joined);
             self.accept(&region);
             // A common step that begins now finds the pulses that have been overlooked.

@@ -5,13 +5,14 @@ use crate::error::Error;
 use crate::flow::FlowStage;
 use crate::flow::coupled::Coupled;
 use crate::flow::coupled::linear::Linear;
+use crate::flow::coupled::rows::ComponentPlace;
 use crate::flow::coupled::system::{Membership, integrated};
 use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::coupled_solution::CoupledSolution;
-use crate::world::prefetch::prefetch;
-use dlsys_tree::{ModuleId, SimTime, Visit};
+use crate::world::prefetch::{Guide, prefetch};
+use dlsys_tree::{ModuleId, SimTime, Visit, room};
 
 /// A solution without steps begins anew, for all modules, at every event; after this many events steps are made.
 const MAX_CUTS: u32 = 2;
@@ -41,12 +42,17 @@ impl FlowStage<'_, '_> {
 
     /// The coupled modules in string order. Their present values become those of the tree and of the state vector.
     fn gather_members(&mut self, at: SimTime) -> Vec<ModuleId> {
-        let mut members = std::mem::take(&mut self.flows.coupled.members);
-        members.clear();
-        members.extend(self.world.tree.walk().filter_map(|visit| match visit {
-            Visit::Module(id) if matches!(self.world.states.get(id.slot()), Some(Some(_))) => Some(id),
-            _ => None,
-        }));
+        let before = std::mem::take(&mut self.flows.coupled.members);
+        let (mut guide, mut members) = (Guide::new(self.world, &before), Vec::new());
+        room::reserve(&mut members, before.len());
+        for visit in self.world.tree.walk() {
+            if let Visit::Module(id) = visit {
+                guide.pass(self.world, id);
+                if self.world.states.get(id.slot()).is_some() {
+                    room::push(&mut members, id);
+                }
+            }
+        }
         let solution = self.world.coupled.take();
         let Coupled { y, system, .. } = &mut self.flows.coupled;
         y.clear();
@@ -72,7 +78,7 @@ impl FlowStage<'_, '_> {
     #[inline]
     fn gather_member(&mut self, id: ModuleId, solution: Option<&CoupledSolution>, at: SimTime) {
         let World { tree, states, .. } = &mut *self.world;
-        let state = states[id.slot()].as_mut().expect("a member");
+        let state = states.get_mut(id.slot()).expect("a member");
         let first = tree.places(id).start;
         for &parameter in integrated(self.setup.model, state) {
             let trajectory = &mut state.trajectories[parameter];
@@ -90,7 +96,7 @@ impl FlowStage<'_, '_> {
             tree.set_value(place, value);
             *trajectory = Trajectory::Coupled(self.flows.coupled.y.len() as u32);
             self.flows.coupled.y.push(value);
-            self.flows.coupled.system.table.places.push((place, id, parameter));
+            self.flows.coupled.system.table.places.push(ComponentPlace::new(first, id, parameter));
         }
         state.pass_changes(at);
         if !state.next.lasting {
@@ -120,8 +126,7 @@ impl FlowStage<'_, '_> {
         let Coupled { system, y, integrator, linear, tried, pulsing, .. } = &mut self.flows.coupled;
         (*tried, *linear) = (without_steps, without);
         // After each step all members are searched.
-        let is_unwatched =
-            rules.iter().all(|rule| rule.atoms.is_empty()) && pulsing.is_empty() && system.algebra.is_empty();
+        let is_unwatched = !self.setup.has_conditions && pulsing.is_empty() && system.algebra.is_empty();
         integrator.set_unwatched(is_unwatched);
         integrator.keep_reached(!pulsing.is_empty());
         if linear.is_none() {
@@ -135,7 +140,7 @@ impl FlowStage<'_, '_> {
     /// True if all integrated parameters of a coupled module have linear equations with constant coefficients.
     fn is_linear(&self, id: ModuleId) -> bool {
         let Some(state) = self.world.state(id) else { return true };
-        let Some((rule, solve)) = state.rule.zip(state.solve) else { return true };
+        let Some((rule, solve)) = state.rule.get().zip(state.solve.get()) else { return true };
         self.setup.model.rules[rule].solves[solve].linear.is_some()
     }
 
@@ -151,11 +156,11 @@ impl FlowStage<'_, '_> {
 
     /// True if some condition of the coupled modules can only be found by searching their common trajectory.
     pub(super) fn searches_coupled(&self) -> bool {
-        self.flows.coupled.members.iter().any(|id| self.has_conditions(*id))
+        self.setup.has_conditions && self.flows.coupled.members.iter().any(|id| self.has_conditions(*id))
     }
 
     fn has_conditions(&self, id: ModuleId) -> bool {
-        let rule = self.world.state(id).and_then(|s| s.rule);
+        let rule = self.world.state(id).and_then(|s| s.rule.get());
         rule.is_some_and(|r| !self.setup.model.rules[r].atoms.is_empty())
     }
 }

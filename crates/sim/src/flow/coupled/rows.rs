@@ -43,12 +43,29 @@ pub struct EquationTable {
     pub(super) inputs: Vec<u32>,
     /// The switches of all rows: 1 for on, 0 for off.
     pub(super) switches: Vec<f64>,
-    /// For each component: its place in the values of the tree, and the module and parameter that it belongs to.
-    pub places: Vec<(usize, ModuleId, usize)>,
+    /// Where each component belongs.
+    pub places: Vec<ComponentPlace>,
     /// The start of the step, from which time is counted.
     pub start: SimTime,
     /// Some rates depend on `t` or `age`.
     pub timed: bool,
+}
+
+/// Where a component belongs.
+#[derive(Clone, Copy, Debug)]
+pub struct ComponentPlace {
+    /// The place in the values of the tree.
+    pub place: u32,
+    /// The parameter of the module.
+    pub parameter: u32,
+    pub module: ModuleId,
+}
+
+impl ComponentPlace {
+    /// Of a parameter of a module whose parameters begin at a place in the values of the tree.
+    pub fn new(first: usize, module: ModuleId, parameter: usize) -> ComponentPlace {
+        ComponentPlace { place: (first + parameter) as u32, parameter: parameter as u32, module }
+    }
 }
 
 /// A parameter with a closed form that rows read.
@@ -234,6 +251,6 @@ impl EquationTable {
 
     /// The module, and its parameter, that a component belongs to.
     pub fn owner(&self, component: usize) -> Option<(ModuleId, usize)> {
-        self.places.get(component).map(|&(_, id, parameter)| (id, parameter))
+        self.places.get(component).map(|of| (of.module, of.parameter as usize))
     }
 }

@@ -53,6 +53,7 @@ impl FlowStage<'_, '_> {
                         false => vec![integrator.dense(&mut equations, y)],
                     };
                     self.world.coupled = Some(CoupledSolution::of(stretches));
+                    integrator.rest();
                 }
             }
         }
@@ -88,6 +89,10 @@ impl FlowStage<'_, '_> {
                 self.search_member(id, from);
             }
             self.flows.coupled.members = members;
+        }
+        if !self.flows.coupled.pending {
+            // Nobody asks for the dense output any more.
+            self.flows.coupled.integrator.rest();
         }
         self.schedule.schedule(Owner::Coupled, end);
         Ok(())
@@ -166,7 +171,7 @@ impl FlowStage<'_, '_> {
                 PulseFinding::Overlooked(at) => Some(at),
                 PulseFinding::Unbounded(at) if tries <= MAX_UNBOUNDED && h > least => Some(at),
                 PulseFinding::Unbounded(at) => {
-                    let rule = self.world.state(*id).and_then(|s| s.rule).unwrap_or(0);
+                    let rule = self.world.state(*id).and_then(|s| s.rule.get()).unwrap_or(0);
                     self.detector.unbounded.entry(rule).or_insert(from.to_f64() + at * h);
                     None
                 }
@@ -195,7 +200,7 @@ impl FlowStage<'_, '_> {
     /// Finds a coupled module's next event before the end of the common step.
     pub fn search_member(&mut self, id: ModuleId, from: SimTime) {
         let Some(state) = self.world.state(id) else { return };
-        let Some(rule) = state.rule.map(|r| &self.setup.model.rules[r]) else { return };
+        let Some(rule) = state.rule.get().map(|r| &self.setup.model.rules[r]) else { return };
         if rule.atoms.is_empty() || state.next.lasting {
             return;
         }
@@ -214,7 +219,7 @@ impl FlowStage<'_, '_> {
         let mut start = from;
         loop {
             let (Some(solution), Some(state)) = (&self.world.coupled, self.world.state(id)) else { return };
-            let Some(rule) = state.rule.map(|r| &self.setup.model.rules[r]) else { return };
+            let Some(rule) = state.rule.get().map(|r| &self.setup.model.rules[r]) else { return };
             // Up to the knot every variable that the module reads follows one polynomial.
             let knot = self.world.knot(state, solution, start);
             let h = knot.since(start);
@@ -229,8 +234,8 @@ impl FlowStage<'_, '_> {
             );
             let last = knot.since(solution.end) >= 0.0;
             let state = self.world.state_mut(id).expect("seen above");
-            state.next.add_changes(found.changes);
-            let (before, index) = (std::mem::replace(&mut state.next.near, found.near), state.rule);
+            state.next.add_changes(&found.changes);
+            let (before, index) = (std::mem::replace(&mut state.next.near, found.near), state.rule.get());
             self.detector.note_approach(index.unwrap_or(0), found.near, before, knot);
             let state = self.world.state_mut(id).expect("seen above");
             if found.event.is_some() {
@@ -281,8 +286,8 @@ impl FlowStage<'_, '_> {
             }
         }
         integrator.advance(y);
-        for (&(place, ..), &value) in system.table.places.iter().zip(y.iter()) {
-            self.world.tree.set_value(place, value);
+        for (of, &value) in system.table.places.iter().zip(y.iter()) {
+            self.world.tree.set_value(of.place as usize, value);
         }
         system.advance(at);
         let stiff = control.stiff && self.setup.settings.method == Method::Auto;
@@ -315,8 +320,10 @@ impl FlowStage<'_, '_> {
 
     /// True if some rate of a module may have pulses.
     pub(super) fn may_pulse(&self, id: ModuleId) -> bool {
-        let clause =
-            self.world.state(id).and_then(|s| Some(&self.setup.model.rules[s.rule?].solves[s.solve?]));
+        let clause = self
+            .world
+            .state(id)
+            .and_then(|s| Some(&self.setup.model.rules[s.rule.get()?].solves[s.solve.get()?]));
         clause.is_some_and(|solve| !solve.pulses.is_empty())
     }
 

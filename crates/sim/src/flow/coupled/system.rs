@@ -3,7 +3,9 @@
 use crate::flow::coupled::aggregates::{Partial, TermBatch};
 use crate::flow::coupled::algebra::Algebra;
 use crate::flow::coupled::lanes::LaneBatches;
-use crate::flow::coupled::rows::{EquationRow, EquationTable, FormulaInput, RowAggregate, VariableSource};
+use crate::flow::coupled::rows::{
+    ComponentPlace, EquationRow, EquationTable, FormulaInput, RowAggregate, VariableSource,
+};
 use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::prefetch::prefetch;
@@ -134,13 +136,13 @@ impl EquationTable {
     ) {
         let state = world.state(id).expect("members have states");
         let first = world.tree.places(id).start;
-        let (Some(rule), Some(solve)) = (state.rule, state.solve) else { return };
+        let (Some(rule), Some(solve)) = (state.rule.get(), state.solve.get()) else { return };
         let (compiled, clause) = (&rules[rule], &rules[rule].solves[solve]);
         self.timed |= clause.stepping.is_timed();
         let first_rate = self.places.len();
         for &parameter in clause.stepping.components(state.numeric_only) {
             if let Some(Trajectory::Coupled(_)) = state.trajectories.get(parameter) {
-                self.places.push((first + parameter, id, parameter));
+                self.places.push(ComponentPlace::new(first, id, parameter));
             }
         }
         let count = self.places.len() - first_rate;
@@ -197,7 +199,7 @@ impl EquationTable {
         // A variable that is not read may have any value.
         let first_source = self.sources.len();
         self.sources.resize(first_source + rule.variables - 2, VariableSource::Fixed(0.0));
-        let clause = &rule.solves[state.solve.expect("a module with equations")];
+        let clause = &rule.solves[state.solve.get().expect("a module with equations")];
         for read in clause.stepping.reads(state.numeric_only) {
             let (module, moves) = match read.neighbour.map(|n| state.context.context()[n]) {
                 None => (id, Some(state)),
@@ -287,6 +289,6 @@ fn rates(solve: &Solve, numeric_only: bool) -> usize {
 /// The parameters of a coupled module that are integrated, then those that are solved for, in the order of their
 /// components.
 pub fn integrated<'m>(model: &'m Model, state: &State) -> &'m [usize] {
-    let Some((rule, solve)) = state.rule.zip(state.solve) else { return &[] };
+    let Some((rule, solve)) = state.rule.get().zip(state.solve.get()) else { return &[] };
     model.rules[rule].solves[solve].stepping.components(state.numeric_only)
 }

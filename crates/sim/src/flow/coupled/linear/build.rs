@@ -65,7 +65,7 @@ impl Linear {
         for (at, &id) in modules.members.iter().enumerate() {
             prefetch(world, modules.members, at);
             let state = world.state(id)?;
-            let Some((rule, solve)) = state.rule.zip(state.solve) else { continue };
+            let Some((rule, solve)) = state.rule.get().zip(state.solve.get()) else { continue };
             let clause = &rules[rule].solves[solve];
             let linear = clause.linear.as_ref()?;
             if known != Some((rule, solve)) {
