@@ -418,7 +418,7 @@ fn jumps_within_aggregates_are_counted_once() {
         );
         // One production at once where it does not begin at 0, and one for each whole number.
         let count = if form.contains("ceil") { 4.0 } else { 3.0 };
-        reaches(&text, 3.14, "Q", &[end, count]);
+        reaches(&text, 3.2, "Q", &[end, count]);
     }
     let both = "sum(M(w, r): floor(w) - 2*floor(w/2))";
     let text = format!(
