@@ -429,3 +429,25 @@ fn jumps_within_aggregates_are_counted_once() {
         reaches(&text, t, "Q", &[n, k]);
     }
 }
+
+/// A neighbour's own event gives a value its level; whoever counts its jumps at the same instant asks that, and not a rounding of it.
+#[test]
+fn jumps_of_a_neighbour_that_has_an_event_there_are_counted_once() {
+    for k in 0..60 {
+        let start = 2.02 + f64::from(k) / 61.7;
+        // Falls by 0.97 a unit of time to 1, then by 2.016.
+        let t = 3.7;
+        let end = 1.0 - 2.016 * (t - (start - 1.0) / 0.97);
+        let passed = 2.0 - end.floor();
+        let parity = |x: f64| x - 2.0 * (x / 2.0).floor();
+        let odd = "floor(u) - 2*floor(0.5*u)";
+        let text = format!(
+            "initial string: A(0, 0) B({start}, 2)\n\
+             A(n, k) > B(u, m): if {odd} != n produce A({odd}, k + 1)\n\
+             B(u, m):\n  solve du/dt = if m >= 1 then -0.97 else -2.016\n  if floor(u) != m produce B(u, floor(u))"
+        );
+        let string = at(&text, t);
+        let a = string.iter().find(|module| module.0 == "A").expect("one");
+        assert_eq!(a.1[..], [parity(end.floor()), passed], "from {start}: {string:?}");
+    }
+}

@@ -22,7 +22,12 @@ impl EventStage<'_, '_> {
             NextEvent::Other(entry) => entry.owner == Owner::Derivation,
         });
         let mut oldest = None;
-        for next in batch {
+        // Whoever asks on which side of a jump it is asks the levels that others meet, not roundings of them.
+        let (asking, first): (Vec<&NextEvent>, Vec<&NextEvent>) = match batch {
+            [_] => (Vec::new(), batch.iter().collect()),
+            _ => batch.iter().partition(|next| self.asks_for_a_jump(next)),
+        };
+        for next in first.into_iter().chain(asking) {
             let owner = match *next {
                 NextEvent::Lazy(_, slot) if all_lazy => {
                     self.events.firing_lazy.push(slot);
@@ -55,6 +60,16 @@ impl EventStage<'_, '_> {
         }
         self.join_ties();
         Ok(oldest)
+    }
+
+    /// True for the event of a module at which something jumps that was not taken apart into what moves.
+    fn asks_for_a_jump(&self, next: &NextEvent) -> bool {
+        let NextEvent::Other(entry) = next else { return false };
+        let Owner::Module(slot) = entry.owner else { return false };
+        let Some(state) = self.world.states.get(slot as usize) else { return false };
+        let Some(rule) = state.rule.get().filter(|rule| self.setup.has_jumps[*rule]) else { return false };
+        let rule = &self.setup.model.rules[rule];
+        state.next.touched().iter().any(|change| rule.jumping_whole[change.atom()])
     }
 
     /// Opens a module because of signs that are zero now.
