@@ -433,21 +433,18 @@ fn jumps_within_aggregates_are_counted_once() {
 /// A neighbour's own event gives a value its level; whoever counts its jumps at the same instant asks that, and not a rounding of it.
 #[test]
 fn jumps_of_a_neighbour_that_has_an_event_there_are_counted_once() {
-    for k in 0..60 {
-        let start = 2.02 + f64::from(k) / 61.7;
-        // Falls by 0.97 a unit of time to 1, then by 2.016.
-        let t = 3.7;
-        let end = 1.0 - 2.016 * (t - (start - 1.0) / 0.97);
-        let passed = 2.0 - end.floor();
-        let parity = |x: f64| x - 2.0 * (x / 2.0).floor();
-        let odd = "floor(u) - 2*floor(0.5*u)";
-        let text = format!(
-            "initial string: A(0, 0) B({start}, 2)\n\
-             A(n, k) > B(u, m): if {odd} != n produce A({odd}, k + 1)\n\
-             B(u, m):\n  solve du/dt = if m >= 1 then -0.97 else -2.016\n  if floor(u) != m produce B(u, floor(u))"
-        );
-        let string = at(&text, t);
-        let a = string.iter().find(|module| module.0 == "A").expect("one");
-        assert_eq!(a.1[..], [parity(end.floor()), passed], "from {start}: {string:?}");
-    }
+    // u falls by 0.97 a unit of time to 1, then by 2.016.
+    let t = 3.71828;
+    let u: f64 = 1.0 - 2.016 * (t - 1.943 / 0.97);
+    let odd = "floor(u) - 2*floor(0.5*u)";
+    let text = format!(
+        "initial string: A(0.729, -1.075, -2, 0) B(2.943, -2.941, 3, 0)\n\
+         A(x, y, n, k) > B(u, w, m, j):\n  solve dx/dt = if m <= -1 then -2.193 else -1.767, dy/dt = 0.572\n  if {odd} != n produce A(x, y, {odd}, k + 1)\n\
+         A(x, y, n, k) < B(u, w, m, j):\n  solve du/dt = if m >= 1 then -0.97 else -2.016, dw/dt = 1.109\n  if floor(u) != m produce B(u, w, floor(u), j + 1)"
+    );
+    let string = at(&text, t);
+    let a = string.iter().find(|module| module.0 == "A").expect("one");
+    let whole = u.floor();
+    // Once at the beginning, and at each whole number.
+    assert_eq!(a.1[2..], [whole - 2.0 * (whole / 2.0).floor(), 1.0 + 2.0 - whole], "{string:?}");
 }
