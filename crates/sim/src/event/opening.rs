@@ -23,11 +23,12 @@ impl EventStage<'_, '_> {
         });
         let mut oldest = None;
         // Whoever asks on which side of a jump it is asks the levels that others meet, not roundings of them.
-        let (asking, first): (Vec<&NextEvent>, Vec<&NextEvent>) = match batch {
-            [_] => (Vec::new(), batch.iter().collect()),
-            _ => batch.iter().partition(|next| self.asks_for_a_jump(next)),
+        let asks: SmallVec<[bool; 8]> = match batch {
+            [_] => SmallVec::from_slice(&[false]),
+            _ => batch.iter().map(|next| self.asks_for_a_jump(next)).collect(),
         };
-        for next in first.into_iter().chain(asking) {
+        let of = |late: bool| batch.iter().zip(&asks).filter(move |(_, asks)| **asks == late);
+        for (next, _) in of(false).chain(of(true)) {
             let owner = match *next {
                 NextEvent::Lazy(_, slot) if all_lazy => {
                     self.events.firing_lazy.push(slot);
