@@ -14,7 +14,7 @@ use super::shared::{Scheduler, SharedArgs};
 use crate::compile::Setting;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::Frames;
-use crate::render::Layout;
+use crate::render::{Layout, View};
 use crate::scene::Scene;
 use crate::session::{Detail, DrawError, Nursery, Session, SwayReport};
 use crate::sim::{self, Settings, Simulation, Stats};
@@ -345,6 +345,22 @@ impl ModelRun {
             .at(camera.span, "stages on a sheet are moved apart, and seen from the front")
             .help("choose another direction, `--view 20,10`, or render a file for each frame, which the camera takes");
         self.note(vec![warning]);
+    }
+
+    /// Notes that a floor without end hides the sky of a picture that is seen from above without perspective.
+    pub fn note_covered_sky(&self, args: &RenderArgs) {
+        let scenery = &self.session.model.scenery;
+        let has_camera = args.camera.is_some() || args.view.is_none() && scenery.camera.is_some();
+        let has_sky = args.sky.is_some() || scenery.sky.is_some();
+        if has_camera || args.perspective.is_some() || !has_sky || scenery.ground.is_none() {
+            return;
+        }
+        let view = args.view.as_deref().and_then(|view| view.parse().ok()).unwrap_or(View::FRONT);
+        if view.is_from_above() {
+            let warning = Diagnostic::warning("the floor hides the sky")
+                .help("without perspective a floor has no horizon: see the scene in perspective, such as with `--perspective 40`");
+            self.note(vec![warning]);
+        }
     }
 
     /// Frames are drawn without ground of soil, whose pieces [`Nursery::draw_quilt`] draws.

@@ -278,6 +278,32 @@ fn little_memory_is_an_error_and_no_abort() {
     assert!(done.status.code() == Some(1) && said.contains("`--max-memory`"), "{said}");
 }
 
+/// Surroundings count, too: those whose strain the rules read, and those of plants in a scene.
+#[cfg(target_os = "linux")]
+#[test]
+fn stems_in_the_wind_keep_within_the_memory_that_is_allowed() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let tuft = |rate: &str| {
+        format!(
+            "wind 1, 0, 0 speed 3 turbulence 0.3 scale 0.5\ntissue g = stiffness 1e8, density 700, damping 0.1\n\
+             initial string: for i in 1 .. 40: ( [ /(137.5*i) &(2*i) @E(g) Blade(i/40) ] )\nBlade(x): solve dx/dt = {rate}\n\
+             interpret Blade(x): !(0.03) F(x/2) @W(0.015) F(x/2) @W(0)\n"
+        )
+    };
+    let fails = |arguments: &[&str]| {
+        let done = dlsys(&[arguments, &["--max-memory", "50MB"]].concat());
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(done.status.code(), Some(1), "{said}");
+        assert!(said.contains("no memory for") && said.contains("allow more with `--max-memory`"), "{said}");
+    };
+    fails(&["run", &model(folder.path(), &tuft("0.1 + strain")), "--at", "0.6"]);
+    std::fs::write(folder.path().join("tuft.dls"), tuft("0.1")).expect("written");
+    let field = "wind 1, 0, 0 speed 3 turbulence 0.3 scale 0.5\nplant @Tuft from \"tuft.dls\"\ninitial string: for i in 1 .. 12: ( [ f(i) @Tuft(-0.3) ] )";
+    let out = folder.path().join("x.png");
+    let out = out.to_str().expect("a path in UTF-8");
+    fails(&["render", &model(folder.path(), field), "--at", "1", "-o", out, "--width", "50"]);
+}
+
 /// Each frame of a sheet is made of what is seen of it, as a picture of its own is.
 #[cfg(target_os = "linux")]
 #[test]

@@ -2,6 +2,7 @@
 //! thresholds that almost coincide, shared instants, singularities.
 
 use dlsys::sim::{Error, Method, Settings};
+use proptest::prelude::*;
 
 use crate::common::{run, show};
 use crate::semantics::{expect, fails, time_of_event};
@@ -203,4 +204,47 @@ fn what_only_adds_up_is_right_after_many_periods() {
     let strings = run(&text, Settings::default(), &[f64::from(days)]).expect("runs");
     let error = strings[0][0].1[0] / exact - 1.0;
     assert!(error.abs() < 2e-6, "{error}");
+}
+
+/// The productions of `A(x, y) : x*y > c`, whose successor is A(-x, -y), up to a time, and its parameters then. x and y move at the rates a and
+/// b, so the product is quadratic; the successor begins on the threshold, and the product falls there.
+fn turning(c: f64, [mut x, mut y]: [f64; 2], [a, b]: [f64; 2], end: f64) -> (u32, [f64; 2]) {
+    let (mut t, mut n) = (0.0, 0);
+    loop {
+        let (square, slope) = (a * b, x * b + y * a);
+        let constant = if n == 0 { x * y - c } else { 0.0 };
+        // No number where the product never gets there.
+        let root = (slope * slope - 4.0 * square * constant).sqrt();
+        let later = [(-slope - root) / (2.0 * square), (-slope + root) / (2.0 * square)];
+        let rises = |s: &f64| *s > 1e-9 && slope + 2.0 * square * s > 0.0;
+        match later.into_iter().filter(rises).fold(f64::INFINITY, f64::min) {
+            s if t + s < end && n < 9 => ((t, n), (x, y)) = ((t + s, n + 1), (-(x + a * s), -(y + b * s))),
+            _ => return (n, [x + a * (end - t), y + b * (end - t)]),
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn a_successor_on_the_threshold_of_a_product_goes_the_way_that_the_product_goes(
+        c in -2.0..2.0f64, x in -3.0..3.0f64, y in -3.0..3.0f64,
+        a in prop_oneof![-2.0..-0.1f64, 0.1..2.0f64], b in prop_oneof![-2.0..-0.1f64, 0.1..2.0f64],
+        integrated in prop::bool::ANY,
+    ) {
+        prop_assume!(x * y < c - 1e-3);
+        let end = 6.3;
+        let (n, expected) = turning(c, [x, y], [a, b], end);
+        // Another time of the same order: the end must not be an event.
+        prop_assume!(turning(c, [x, y], [a, b], end + 1e-4).0 == n);
+        let text = format!(
+            "initial string: A({x:?}, {y:?}, 0)\nA(x, y, n):\n  solve dx/dt = {a:?}, dy/dt = {b:?}\n  if x*y > {c:?} & n < 9 produce A(-x, -y, n + 1)"
+        );
+        let method = if integrated { Method::Dopri5 } else { Method::Auto };
+        let strings = run(&text, Settings { method, ..Settings::default() }, &[end]);
+        let string = strings.unwrap_or_else(|error| panic!("{error}\n{text}")).remove(0);
+        let found = &string[0].1;
+        prop_assert_eq!(found[2], f64::from(n), "{:?}\n{}", found, text);
+        prop_assert!((found[0] - expected[0]).abs() < 1e-4 && (found[1] - expected[1]).abs() < 1e-4, "{:?}, not {:?}\n{}", found, expected, text);
+    }
 }

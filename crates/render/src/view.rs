@@ -56,6 +56,11 @@ impl View {
         View { azimuth: self.azimuth + degrees, right, up: towards.cross(&right), towards, ..*self }
     }
 
+    /// True if the viewer looks down.
+    pub fn is_from_above(&self) -> bool {
+        self.elevation > 0.0
+    }
+
     /// Sine and cosine of the elevation.
     pub(super) fn inclination(&self) -> (f64, f64) {
         (self.towards.y, self.up.y)

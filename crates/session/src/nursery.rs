@@ -492,7 +492,10 @@ fn within(plant: &model::Plant, message: String, inner: &Diagnostic) -> Diagnost
         let column = before.chars().rev().take_while(|c| *c != '\n').count() + 1;
         format!("{}:{line}:{column}: ", plant.source.name)
     });
-    Diagnostic::error(message).at(plant.span, "this plant").note(format!("{place}{}", inner.message))
+    let error = Diagnostic::error(message).at(plant.span, "this plant");
+    let error = error.note(format!("{place}{}", inner.message));
+    let error = inner.notes.iter().fold(error, |error, note| error.note(note.as_str()));
+    inner.help.iter().fold(error, |error, help| error.help(help.as_str()))
 }
 
 /// Forces and falls are those of the size that a model declares.

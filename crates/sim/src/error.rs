@@ -389,12 +389,8 @@ impl Error {
                 d.help(format!("if it is worth waiting for, allow more: `--max-seconds {}`", limit * 10.0))
             }
             Error::OutOfMemory { shortage, .. } => {
-                let wanted = format!("{:.0} MB more were wanted", shortage.wanted as f64 / 1e6);
-                let d = d.note(match shortage.there {
-                    Some(there) => format!("{wanted}, and there are {:.0} MB", there as f64 / 1e6),
-                    None => format!("{wanted}, and the system does not give them"),
-                });
-                d.help_opt(shortage.own_limit.then(|| "allow more with `--max-memory`, such as `--max-memory 8GB`".to_owned()))
+                d.note(shortage.note())
+                    .help_opt(shortage.help())
                     .help("if this structure is not meant to be so large, bound its growth, or stop it earlier: `--max-modules N` says where it gets too large")
             }
             Error::TooManyModules { limit, .. } => {

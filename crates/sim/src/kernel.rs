@@ -386,7 +386,7 @@ impl<'m> Simulation<'m> {
         self.progress.stalled = if is_short { self.progress.stalled + 1 } else { 0 };
         match self.progress.stalled <= MAX_STALLED {
             true => Ok(()),
-            false => Err(Error::Zeno { site: self.world.site_of_rule(self.setup.model, id, now) }),
+            false => Err(self.no_progress(id, |site| Error::Zeno { site })),
         }
     }
 
@@ -399,8 +399,15 @@ impl<'m> Simulation<'m> {
         // Many modules may change their equations one after the other within a short time.
         match times <= MAX_STANDING.max(8 * self.world.tree.len()) || !stands {
             true => Ok(()),
-            false => Err(Error::Chattering { site: self.world.site_of_rule(self.setup.model, id, now) }),
+            false => Err(self.no_progress(id, |site| Error::Chattering { site })),
         }
+    }
+
+    /// The error of a module with which time does not go on.
+    #[cold]
+    fn no_progress(&mut self, id: ModuleId, error: impl FnOnce(Site) -> Error) -> Error {
+        let undefined = self.flow_stage().undefined_rate(id);
+        undefined.unwrap_or_else(|| error(self.world.site_of_rule(self.setup.model, id, self.instant.at)))
     }
 
     /// Work done so far.

@@ -11,6 +11,9 @@ const SMALL: u64 = 16 << 20;
 /// The part of the available memory that may be taken; the rest is for other processes.
 const SHARE: f64 = 0.9;
 
+/// Ticks after which the memory that surroundings take is looked at.
+pub const TICKS_OF_MEMORY: u64 = 8;
+
 /// Memory that is not there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shortage {
@@ -20,6 +23,30 @@ pub struct Shortage {
     pub there: Option<u64>,
     /// It is a limit of our own that says so.
     pub own_limit: bool,
+}
+
+impl Shortage {
+    /// What was wanted, and what there is, for a message.
+    pub fn note(&self) -> String {
+        let wanted = format!("{:.0} MB more were wanted", self.wanted as f64 / 1e6);
+        match self.there {
+            Some(there) => format!("{wanted}, and there are {:.0} MB", there as f64 / 1e6),
+            None => format!("{wanted}, and the system does not give them"),
+        }
+    }
+
+    /// What allows more, if it is a limit of our own.
+    pub fn help(&self) -> Option<String> {
+        self.own_limit.then(|| "allow more with `--max-memory`, such as `--max-memory 8GB`".to_owned())
+    }
+}
+
+/// Asks for a little more, where nobody counts what is taken, as in surroundings: what is taken by then, counts. It costs some 20 µs.
+///
+/// # Errors
+/// If it is not there.
+pub fn ask_for_a_little(limit: u64) -> Result<(), Shortage> {
+    ask(SMALL.min(limit / 64).max(1), limit, 0)
 }
 
 /// Asks for so many bytes more; `limit` is what the process may take in all, `used` what it takes at least, where the system

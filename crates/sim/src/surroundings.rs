@@ -7,9 +7,11 @@
 //! A tick is an entry of the schedule, after all others of its instant. So neither frames nor threads can change its time, the
 //! string that it sees, or anything that follows from it.
 
+use crate::budget;
 use crate::error::{Error, Site};
 use crate::kernel::Simulation;
 use crate::log::Event;
+use crate::memory::{self, TICKS_OF_MEMORY};
 use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
 use crate::world::{World, describe, site_of_axiom};
@@ -177,11 +179,13 @@ pub(super) struct Link<'m> {
     readers: Readers,
     /// How often a module has begun new trajectories because of a tick.
     restarts: u64,
+    /// Ticks so far.
+    ticks: u64,
 }
 
 impl<'m> Link<'m> {
     fn new(source: Box<dyn Surroundings + 'm>) -> Link<'m> {
-        Link { source, readers: Readers::default(), restarts: 0 }
+        Link { source, readers: Readers::default(), restarts: 0, ticks: 0 }
     }
 
     /// Bytes that a copy takes, about.
@@ -279,6 +283,12 @@ impl<'m> Simulation<'m> {
         productions.append(self.log.descent.get_or_insert_default());
         let given = source.tick(&readers.string, &mut readers.inputs);
         given.map_err(|failure| self.failure(failure, readers))?;
+        if link.ticks.is_multiple_of(TICKS_OF_MEMORY) {
+            memory::ask_for_a_little(self.setup.settings.max_memory).map_err(|shortage| {
+                budget::out_of_memory(&self.world, shortage, self.site_of_shown(None, &link.readers))
+            })?;
+        }
+        link.ticks += 1;
         let duration = self.schedule_tick(link, Some(now))?;
         link.restarts += self.hand(&link.readers, duration, now)?;
         Ok(())
@@ -372,19 +382,24 @@ impl<'m> Simulation<'m> {
         Ok(true)
     }
 
-    /// The error of surroundings that cannot go on.
-    fn failure(&self, failure: Failure, readers: &Readers) -> Error {
+    /// The place of a module of the string that the surroundings were shown, or of the first one.
+    fn site_of_shown(&self, index: Option<usize>, readers: &Readers) -> Site {
         let now = self.instant.at;
         let modules = |index: usize| readers.string.iter().enumerate().nth(index);
         let first = || readers.string.iter().enumerate().find(|(_, module)| !module.kind.is_bracket());
-        let mut site = site_of_axiom(now.to_f64());
-        if let Some((index, module)) = failure.module.and_then(modules).or_else(first)
+        if let Some((index, module)) = index.and_then(modules).or_else(first)
             && let Some(Visit::Module(id)) = self.world.tree.walk().nth(index)
         {
             let model = self.setup.model;
             let text = describe(model, module.kind, module.parameters);
-            site = Site { module: text, ..self.world.site_of_module(model, id, now) };
+            return Site { module: text, ..self.world.site_of_module(model, id, now) };
         }
+        site_of_axiom(now.to_f64())
+    }
+
+    /// The error of surroundings that cannot go on.
+    fn failure(&self, failure: Failure, readers: &Readers) -> Error {
+        let mut site = self.site_of_shown(failure.module, readers);
         site.span = failure.span.unwrap_or(site.span);
         Error::Surroundings { site, failure: Box::new(failure) }
     }

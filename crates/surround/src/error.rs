@@ -7,6 +7,7 @@ use dlsys_geometry::turtle;
 use dlsys_ground as ground;
 use dlsys_model::Model;
 use dlsys_sheet as sheet;
+use dlsys_sim::memory::Shortage;
 use dlsys_sim::{self as sim, brief};
 use dlsys_sway as sway;
 use dlsys_tree::Lineage;
@@ -266,6 +267,16 @@ pub enum Error {
         /// The declaration of the first tissue, the first `@D`, the first body, or the first `@S`.
         span: Span,
     },
+    /// The system, or [`Settings::max_memory`](sim::Settings::max_memory), refuses memory.
+    #[error("no memory for the surroundings at t = {}", brief(*.time, 8))]
+    OutOfMemory {
+        /// The bytes wanted and available.
+        shortage: Shortage,
+        /// The time in units of the model.
+        time: f64,
+        /// As of `OutOfTime`.
+        span: Span,
+    },
     /// Too many steps up to the time that is asked for.
     #[error("the surroundings take more than {most:e} steps up to t = {time}")]
     TooLong {
@@ -425,6 +436,11 @@ impl Error {
             ))
             .at(*span, "this moves")
             .help("`--max-seconds` is the limit; `--bend-tolerance 0.01` makes fewer steps"),
+            Error::OutOfMemory { shortage, span, .. } => Diagnostic::error(self.to_string())
+                .at(*span, "this moves")
+                .note(shortage.note())
+                .help_opt(shortage.help())
+                .help("each plant that moves takes memory for every stem: let fewer plants, or fewer of their stems, have a tissue"),
             Error::TooLong { most, time, seconds, span } => Diagnostic::error(format!(
                 "the surroundings take more than {most:.0e} steps up to t = {}",
                 brief(*time, 8)

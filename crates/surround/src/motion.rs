@@ -13,6 +13,7 @@ use dlsys_diagnostic::Span;
 use dlsys_geometry::scene::Scene;
 use dlsys_geometry::turtle;
 use dlsys_model::Model;
+use dlsys_sim::memory::{self, TICKS_OF_MEMORY};
 use dlsys_sim::{self as sim, Settings};
 use dlsys_sway as sway;
 use dlsys_tree::ModuleString;
@@ -91,6 +92,8 @@ struct Courses<'m> {
     /// Seconds that the stems may take, and what they have taken.
     limit: f64,
     spent: Duration,
+    /// Bytes that the process may take.
+    memory: u64,
     scene: Scene,
 }
 
@@ -123,6 +126,7 @@ impl<'m> Motion<'m> {
             past: Recent::new(passive.kept),
             marks: passive.marks.then(|| Marks::new(usize::MAX)),
             limit: settings.max_seconds,
+            memory: settings.max_memory,
             spent: Duration::ZERO,
             present,
             flights,
@@ -255,6 +259,9 @@ impl<'m> Courses<'m> {
         let past = self.present.tick(&mut self.flights);
         self.spent += begun.map_or(Duration::ZERO, |begun| begun.elapsed());
         self.check_time()?;
+        if self.present.number.is_multiple_of(TICKS_OF_MEMORY) {
+            self.check_memory()?;
+        }
         let past = past?;
         let size = past.size();
         self.past.add(past.number, past, size);
@@ -269,8 +276,21 @@ impl<'m> Courses<'m> {
         if self.spent.as_secs_f64() <= self.limit {
             return Ok(());
         }
-        let bending = &self.present.bending;
-        let (time, span) = (bending.place().time_of(self.present.number), span(bending.model()));
+        let (time, span) = self.present_place();
         Err(Error::OutOfTime { limit: self.limit, time, span })
+    }
+
+    /// Fails if there is no memory to go on.
+    fn check_memory(&self) -> Result<(), Error> {
+        memory::ask_for_a_little(self.memory).map_err(|shortage| {
+            let (time, span) = self.present_place();
+            Error::OutOfMemory { shortage, time, span }
+        })
+    }
+
+    /// The present time, in units of the model, and what moves.
+    fn present_place(&self) -> (f64, Span) {
+        let bending = &self.present.bending;
+        (bending.place().time_of(self.present.number), span(bending.model()))
     }
 }

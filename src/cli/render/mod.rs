@@ -133,6 +133,9 @@ pub fn render_run(
         run.note_missing_gases("an SVG picture");
     }
     run.note_unused_camera(args);
+    if args.layout == Layout::Frames && format.content() != Content::Mesh {
+        run.note_covered_sky(args);
+    }
     turntable::repeat(args, &mut run.times);
     let mut clock = run.clock;
     let threads = flags::threads(args);

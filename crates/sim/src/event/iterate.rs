@@ -47,6 +47,7 @@ impl EventStage<'_, '_> {
                 self.afford_round(self.events.steps.len(), self.events.steps.first())?;
             }
             let mut firing = self.judge();
+            self.take_back_rounding(&mut firing);
             let mut lazy = std::mem::take(&mut self.events.firing_lazy);
             self.find_steps(&mut firing);
             if !self.events.steps.firing.is_empty() {
@@ -113,6 +114,30 @@ impl EventStage<'_, '_> {
             Some(Firing { id, rule, produce, after: open.behind && self.setup.jumps[rule][produce] })
         }));
         firing
+    }
+
+    /// Takes back productions of modules that begin on a threshold but for the resolution of time, where the numbers of their parameters are
+    /// a rounding beyond it: whether one holds is told by where they go from there.
+    fn take_back_rounding(&mut self, firing: &mut Vec<Firing>) {
+        let begins_near = |me: &Self, fire: &Firing| {
+            let open = me.world.state(fire.id).and_then(|state| state.open.as_ref());
+            open.is_some_and(|open| open.flow.is_none() && !open.clear)
+        };
+        if !firing.iter().any(|fire| begins_near(self, fire)) {
+            return;
+        }
+        let opened = std::mem::take(&mut self.events.opened);
+        self.choose_first(&opened);
+        self.events.opened = opened;
+        self.flows.known_rates.clear();
+        firing.retain(|fire| {
+            if !begins_near(self, fire) {
+                return true;
+            }
+            self.signs_after(fire.id);
+            let open = self.world.state(fire.id).and_then(|state| state.open.as_ref());
+            open.is_none_or(|open| self.production_at(fire.rule, &open.at) == Some(fire.produce))
+        });
     }
 
     /// The place of a round of productions that is one too many.

@@ -153,7 +153,7 @@ impl EventStage<'_, '_> {
     }
 
     /// The first choice: the first clause that can hold where the signs are expected to go.
-    fn choose_first(&mut self, opened: &[ModuleId]) {
+    pub(super) fn choose_first(&mut self, opened: &[ModuleId]) {
         for id in opened {
             let Some(state) = self.world.state_mut(*id) else { continue };
             let Some(rule) = state.rule.get().map(|r| &self.setup.model.rules[r]) else { continue };
@@ -325,7 +325,7 @@ impl EventStage<'_, '_> {
 
     /// Where a module's signs go under the present equations. Also tells whether a sign turned out to be
     /// zero within the resolution of time.
-    fn signs_after(&mut self, id: ModuleId) -> (Signs, bool) {
+    pub(super) fn signs_after(&mut self, id: ModuleId) -> (Signs, bool) {
         let state = self.world.state(id).expect("open modules have a state");
         let rule = &self.setup.model.rules[state.rule.get().expect("open modules have a rule")];
         let known = state.open.as_ref().expect("open");
@@ -418,8 +418,11 @@ impl EventStage<'_, '_> {
         self.world.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()))
     }
 
-    fn no_equations(&self, missing: &NoMode) -> Error {
+    fn no_equations(&mut self, missing: &NoMode) -> Error {
         let id = missing.id;
+        if let Some(error) = self.flow().undefined_rate(id) {
+            return error;
+        }
         let index = self.world.state(id).and_then(|s| s.rule.get()).expect("open modules have a rule");
         let rule = &self.setup.model.rules[index];
         let site = self.world.site(self.setup.model, id, index, rule.span, self.instant.at);

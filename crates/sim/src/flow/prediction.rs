@@ -53,9 +53,12 @@ pub struct PredictedCrossing {
 /// Predicts the life of a module that is born at an instant. The variables in `scratch` are its parameters, then `t` and
 /// `age`. None if there is no closed form for it.
 pub fn predict(rule: &Rule, birth: SimTime, scratch: &mut Scratch) -> Option<Prediction> {
-    let (signs, clear) = signs_at_birth(rule, scratch);
+    let SignsAtBirth { signs, clear, in_doubt } = signs_at_birth(rule, scratch);
     let holds = |guard: &Condition| guard.judge(|i| signs[i]) == Truth::Yes;
     if let Some(produce) = rule.produces.iter().position(|p| holds(&p.guard)) {
+        if in_doubt {
+            return None;
+        }
         let end = Some(PredictedEnd::AtBirth { produce });
         return Some(Prediction { solve: None, signs, trajectories: SmallVec::new(), end, lasting: None });
     }
@@ -230,22 +233,32 @@ fn trajectories(
     closed_form::formulas(clause, rule.time_variable(), scratch, &mut trajectories).then_some(trajectories)
 }
 
-/// The signs of a newborn module's atoms, and whether all are clearly different from zero.
-fn signs_at_birth(rule: &Rule, scratch: &mut Scratch) -> (Signs, bool) {
-    let mut signs = Signs::new();
+/// The signs of a newborn module's atoms.
+#[derive(Default)]
+struct SignsAtBirth {
+    signs: Signs,
+    /// All are clearly different from zero.
+    clear: bool,
+    /// Some sides differ by so little that it may be the resolution of time.
+    in_doubt: bool,
+}
+
+fn signs_at_birth(rule: &Rule, scratch: &mut Scratch) -> SignsAtBirth {
+    let mut at_birth = SignsAtBirth { clear: true, ..SignsAtBirth::default() };
     if rule.atoms.is_empty() {
-        return (signs, true);
+        return at_birth;
     }
     let mut out: SmallVec<[f64; 8]> = smallvec::smallvec![0.0; rule.sides.outputs()];
     rule.sides.eval(&scratch.variables, &mut scratch.registers, &mut out);
     let own = &scratch.variables[..rule.parameters.len()];
     let scale = own.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
-    let mut clear = true;
     for side in out.chunks(2) {
-        clear &= is_clear(side[0], side[1], scale);
-        signs.push(sign_at_birth(side[0], side[1]));
+        let (clear, sign) = (is_clear(side[0], side[1], scale), sign_at_birth(side[0], side[1]));
+        at_birth.clear &= clear;
+        at_birth.in_doubt |= !clear && matches!(sign, Sign::Plus | Sign::Minus);
+        at_birth.signs.push(sign);
     }
-    (signs, clear)
+    at_birth
 }
 
 /// True if the sides of an atom clearly differ at birth, in a module whose largest parameter, or 1, is `scale`.

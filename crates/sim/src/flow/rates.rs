@@ -1,6 +1,7 @@
 //! Rates of parameters at an instant, by the equations that are active there, and values a little ahead.
 
 use super::FlowStage;
+use crate::error::Error;
 use crate::world::context::{Context, gather};
 use dlsys_expr::Dual;
 use dlsys_model::Rule;
@@ -90,6 +91,27 @@ impl FlowStage<'_, '_> {
     /// The rates of a module's parameters now, by its present equations and known rates of others.
     pub fn rates_now(&mut self, id: ModuleId, out: &mut Vec<f64>) {
         self.rates_to(id, 0.0, DEPTH, out);
+    }
+
+    /// The error of a rate of a module that is no number now, or on the other side of a condition inside the equations, as that of an array
+    /// beyond its end: it leads nowhere, and looks like equations that push against each other, or like events without end.
+    pub fn undefined_rate(&mut self, id: ModuleId) -> Option<Error> {
+        let sides = self.world.state(id)?.switches.clone();
+        let mut rates = Vec::new();
+        let others = std::iter::once(None).chain((0..sides.len()).map(Some));
+        let parameter = others.into_iter().find_map(|other| {
+            let state = self.world.state_mut(id)?;
+            state.switches.clone_from(&sides);
+            if let Some(side) = other.and_then(|other| state.switches.get_mut(other)) {
+                *side = !*side;
+            }
+            self.flows.known_rates.forget(id);
+            self.rates_now(id, &mut rates);
+            rates.iter().position(|rate| !rate.is_finite())
+        });
+        self.world.state_mut(id)?.switches = sides;
+        self.flows.known_rates.forget(id);
+        Some(self.world.rate_not_finite(self.setup.model, id, parameter?, self.instant.at))
     }
 
     /// The rates of a module's parameters a little ahead, by its present equations.

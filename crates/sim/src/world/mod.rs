@@ -260,6 +260,22 @@ impl World {
 
     /// The error of a parameter that is no finite number.
     pub fn not_finite(&self, model: &Model, id: ModuleId, parameter: usize, at: SimTime) -> Error {
+        self.no_number(model, id, parameter, at, str::to_owned)
+    }
+
+    /// The error of a parameter the rate of which is no finite number.
+    pub fn rate_not_finite(&self, model: &Model, id: ModuleId, parameter: usize, at: SimTime) -> Error {
+        self.no_number(model, id, parameter, at, |name| format!("the rate of {name}"))
+    }
+
+    fn no_number(
+        &self,
+        model: &Model,
+        id: ModuleId,
+        parameter: usize,
+        at: SimTime,
+        what: impl Fn(&str) -> String,
+    ) -> Error {
         let (rule, solve) = self.rule_and_clause(id);
         let rule_index = rule.unwrap_or(0);
         let compiled = &model.rules[rule_index];
@@ -269,7 +285,8 @@ impl World {
             let span = compiled.produces[clock.produce].span;
             return Error::NotFinite { site: Site { span, ..site }, what: "the rate of an event".to_owned() };
         }
-        Error::NotFinite { site, what: compiled.parameters.get(parameter).cloned().unwrap_or_default() }
+        let name = compiled.parameters.get(parameter).map_or("", String::as_str);
+        Error::NotFinite { site, what: what(name) }
     }
 
     /// The place of a module with the clause that it follows, or the production that it is about to make, as far as it is
