@@ -58,7 +58,13 @@ impl Question<'_> {
     /// True if a production holds at the instant or just after it, where what jumps has these signs.
     fn holds(&self, signs: &[Sign]) -> bool {
         let of = |place: usize, other: Sign| if self.jumps[place] { signs[place] } else { other };
-        self.holds_with(|place| of(place, self.touched[place].at))
+        // Behind a jump no zero of what jumps tells anything: as `production_at` has it.
+        let is_behind = (0..signs.len()).any(|place| self.jumps[place] && signs[place] != Sign::Zero);
+        let at = |place: usize| match self.touched[place].at {
+            Sign::Zero if is_behind && self.rule.jumping[self.touched[place].atom()] => Sign::Any,
+            sign => sign,
+        };
+        self.holds_with(|place| of(place, at(place)))
             || self.holds_with(|place| of(place, self.touched[place].after))
     }
 }
