@@ -7,6 +7,9 @@ const LINE: usize = 64;
 /// The numbers in a line.
 const IN_LINE: usize = LINE / size_of::<f64>();
 
+/// A column that grows has room for this part of its numbers more.
+const SPARE: usize = 8;
+
 /// Numbers that begin at a line.
 #[derive(Debug, Default)]
 pub(crate) struct Column {
@@ -21,7 +24,9 @@ impl Column {
     /// Makes room for so many numbers; those that were there are kept, new ones are 0.
     pub fn resize(&mut self, len: usize) {
         if self.first + len > self.room.len() {
-            let mut other = Column::with_room(len);
+            // What has grown grows on, by a little with each step of a tissue.
+            let more = if self.len > 0 { len / SPARE } else { 0 };
+            let mut other = Column { len, ..Column::with_room(len + more) };
             let kept = self.len.min(len);
             other.room[other.first..][..kept].copy_from_slice(&self[..kept]);
             *self = other;
@@ -102,6 +107,8 @@ mod tests {
         column.resize(2);
         column.resize(4);
         assert_eq!(column[..], [1.0, 2.0, 0.0, 0.0]);
+        (100..400).for_each(|len| column.resize(len));
+        assert_eq!((&column[..2], &column[2..]), (&[1.0, 2.0][..], &[0.0; 397][..]));
         let copy = column.clone();
         assert_eq!(copy[..], column[..]);
         for column in [column, copy] {

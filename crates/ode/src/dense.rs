@@ -44,10 +44,10 @@ pub struct Dense {
     /// Bound of the error of the components, relative to their size; 0 where the output is exact.
     pub error: f64,
     /// Errors of single components beyond that, absolute, by component in ascending order: where a polynomial stands for a function that is not smooth.
-    pub misfits: Vec<(u32, f64)>,
+    pub misfits: Box<[(u32, f64)]>,
     degree: usize,
     /// `degree + 1` coefficients for each component.
-    coefficients: Vec<f64>,
+    coefficients: Box<[f64]>,
 }
 
 impl Dense {
@@ -56,7 +56,8 @@ impl Dense {
     pub fn new(start: SimTime, end: Option<SimTime>, h: f64, degree: usize, coefficients: Vec<f64>) -> Dense {
         debug_assert!(degree <= MAX_DEGREE);
         let end = end.unwrap_or_else(|| start.after(h));
-        Dense { start, end, h, error: 0.0, misfits: Vec::new(), degree, coefficients }
+        let coefficients = coefficients.into_boxed_slice();
+        Dense { start, end, h, error: 0.0, misfits: Box::default(), degree, coefficients }
     }
 
     /// The error of a component beyond [`Dense::error`], absolute.
@@ -136,7 +137,7 @@ impl Dense {
         let start = if lo == 0.0 { self.start } else { self.start.after(lo * self.h) };
         let end = if hi == 1.0 { self.end } else { self.start.after(hi * self.h) };
         let h = if lo == 0.0 && hi == 1.0 { self.h } else { end.since(start) };
-        Dense { start, end, h, error: self.error, misfits: Vec::new(), degree: MAX_DEGREE, coefficients: all }
+        Dense { error: self.error, ..Dense::new(start, Some(end), h, MAX_DEGREE, all) }
     }
 
     /// One component at a position, and its rate there, per unit of position.

@@ -409,9 +409,13 @@ impl World {
     /// As [`World::rebase`], with values that are given.
     pub fn rebase_with(&mut self, id: ModuleId, now: SimTime, given: &[(usize, f64)]) {
         self.rebase(id, now);
-        let start = self.tree.places(id).start;
+        self.give(id, given);
+    }
+
+    /// Gives some parameters of a module without trajectories new values.
+    pub fn give(&mut self, id: ModuleId, given: &[(usize, f64)]) {
         for (parameter, value) in given {
-            self.tree.set_value(start + parameter, *value);
+            self.tree.set_value(self.tree.places(id).start + parameter, *value);
         }
     }
 
@@ -435,7 +439,7 @@ impl World {
             self.new_state(id);
         }
         let Some(state) = self.state_mut(id) else { return };
-        (state.since, state.free_until) = (now, f64::NAN);
+        (state.since, state.horizon) = (now, f64::NAN);
         state.trajectories.clear();
         state.trajectories.resize(width, Trajectory::Rest);
         for (_, parameter) in kind.read_inputs() {

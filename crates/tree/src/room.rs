@@ -53,6 +53,16 @@ pub fn lengthen<T>(list: &mut Vec<T>, len: usize, make: impl FnMut() -> T) {
     }
 }
 
+/// Makes a list so long that it has an element at a place, and as long as there is room for: the lists by slots, in which modules are put one
+/// by one.
+#[inline]
+pub fn cover<T>(list: &mut Vec<T>, place: usize, make: impl FnMut() -> T) {
+    if list.len() <= place {
+        reserve(list, place + 1 - list.len());
+        fill(list, list.capacity(), make);
+    }
+}
+
 /// Apart, so that the question before it stands in the place of the call: most lists are long enough.
 #[cold]
 #[inline(never)]
@@ -80,6 +90,11 @@ mod tests {
         assert!(list.iter().copied().eq(0..100_000));
         lengthen(&mut list, 100_001, || 7);
         lengthen(&mut list, 10, || 8);
+        cover(&mut list, 10, || 8);
         assert_eq!((list.len(), list.last()), (100_001, Some(&7)));
+        cover(&mut list, 100_001, || 9);
+        assert!(
+            list.len() > 100_001 && list.len() == list.capacity() && list[100_001..].iter().all(|n| *n == 9)
+        );
     }
 }

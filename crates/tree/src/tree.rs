@@ -24,8 +24,8 @@ pub(super) use node::{Link, Node};
 /// The branch that holds the main axis.
 pub(super) const TRUNK: u32 = 0;
 
-/// A module in a [`Tree`], while it lives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+/// A module in a [`Tree`], while it lives. The default is none: the slot of the trunk.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ModuleId {
     slot: u32,
     generation: u32,

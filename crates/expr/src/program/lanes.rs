@@ -46,14 +46,21 @@ impl DerefMut for Lanes {
 /// Lanes that fit into the processor's registers together, so that the result may overwrite an operand without a copy.
 const PART: usize = 8;
 
+/// One part of some lanes. (What goes through `map` of an array is a call where it is not inlined, and that is not built for wide
+/// registers.)
+#[inline(always)]
+fn part(lanes: &Lanes, i: usize) -> [f64; PART] {
+    lanes.as_chunks::<PART>().0[i]
+}
+
 /// Applies an operation to the first `PARTS` parts of the lanes.
 #[inline(always)]
 fn each<const PARTS: usize>(registers: &mut [Lanes], [to, a, b]: [Register; 3], f: impl Fn(f64, f64) -> f64) {
-    let [to, a, b] = [to, a, b].map(|register| register as usize);
+    let (to, a, b) = (to as usize, a as usize, b as usize);
     // Looked at once, not for every part.
     assert!(to < registers.len() && a < registers.len() && b < registers.len());
     for i in 0..PARTS {
-        let [mut x, y] = [a, b].map(|register| registers[register].as_chunks::<PART>().0[i]);
+        let (mut x, y) = (part(&registers[a], i), part(&registers[b], i));
         for (x, y) in x.iter_mut().zip(y) {
             *x = f(*x, y);
         }
@@ -68,11 +75,11 @@ fn each_of_three<const PARTS: usize>(
     [to, a, b, c]: [Register; 4],
     f: impl Fn(f64, f64, f64) -> f64,
 ) {
-    let [to, a, b, c] = [to, a, b, c].map(|register| register as usize);
+    let (to, a, b, c) = (to as usize, a as usize, b as usize, c as usize);
     let all = registers.len();
     assert!(to < all && a < all && b < all && c < all);
     for i in 0..PARTS {
-        let [mut x, y, z] = [a, b, c].map(|register| registers[register].as_chunks::<PART>().0[i]);
+        let (mut x, y, z) = (part(&registers[a], i), part(&registers[b], i), part(&registers[c], i));
         for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
             *x = f(*x, y, z);
         }

@@ -212,7 +212,9 @@ pub(super) fn dop853_dense<const N: usize>(
     y1: &[f64; N],
     hk: &[[f64; N]; 16],
 ) -> [[f64; 8]; N] {
-    let [r5, r6, r7, r8] = [0, 1, 2, 3].map(|i: usize| dense_sum(DOP853.d[i], hk));
+    let d = DOP853.d;
+    let (r5, r6) = (dense_sum(d[0], hk), dense_sum(d[1], hk));
+    let (r7, r8) = (dense_sum(d[2], hk), dense_sum(d[3], hk));
     let mut all = [[0.0; 8]; N];
     for (j, all) in all.iter_mut().enumerate() {
         let (y0, y1, first, end) = (y0[j], y1[j], hk[0][j], hk[12][j]);

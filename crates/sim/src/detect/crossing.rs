@@ -146,16 +146,21 @@ impl Function for LevelDifference<'_> {
 /// True if the crossings of some atom of a module can only be found by search, so that the stretch to search must be
 /// bounded.
 pub fn needs_search(state: &State, rule: &Rule) -> bool {
-    let searched = |(atom, crossing)| {
-        !is_unreachable(rule, state, atom)
-            && matches!(location_method(crossing, state), LocationMethod::Search)
-    };
-    rule.zero_crossings(state.solve.get()).iter().enumerate().any(searched)
+    let searched = |(_, crossing)| matches!(location_method(crossing, state), LocationMethod::Search);
+    reachable(rule, state).any(searched)
 }
 
-/// True if the analysis of the model has proven that an atom keeps its sign under the active equations.
-pub(super) fn is_unreachable(rule: &Rule, state: &State, atom: usize) -> bool {
-    state.solve.get().is_some_and(|s| rule.solves[s].unreachable[atom])
+/// The atoms of a module's rule whose signs may change under the active equations, as far as the analysis of the model has not proven that
+/// they do not: their numbers, and how their sides meet.
+#[inline]
+pub(super) fn reachable<'r>(
+    rule: &'r Rule,
+    state: &State,
+) -> impl Iterator<Item = (usize, &'r ZeroCrossing)> + use<'r> {
+    let solve = state.solve.get();
+    let unreachable = solve.map_or(&[][..], |solve| &rule.solves[solve].unreachable);
+    let all = rule.zero_crossings(solve).iter().enumerate();
+    all.filter(move |(atom, _)| !unreachable.get(*atom).is_some_and(|unreachable| *unreachable))
 }
 
 /// How the crossings of an atom are located.
@@ -169,6 +174,7 @@ pub(super) enum LocationMethod<'w> {
 }
 
 /// The location method of an atom, given the trajectories of the parameters.
+#[inline]
 pub(super) fn location_method<'w>(crossing: &'w ZeroCrossing, state: &State) -> LocationMethod<'w> {
     match crossing {
         ZeroCrossing::Constant => LocationMethod::Never,
@@ -183,6 +189,7 @@ pub(super) fn location_method<'w>(crossing: &'w ZeroCrossing, state: &State) -> 
 /// The one level at which the sides of an atom meet that compares a variable with it: the variable, the level, and the side
 /// on which the difference has the sign that it has now; 0 where a formula does not tell. `value` gives that of a formula for
 /// the level.
+#[inline]
 pub(super) fn level_of_dense(
     crossing: &ZeroCrossing,
     sign: Sign,

@@ -5,7 +5,7 @@
 //! its level after the end, or never; the hull of a parameter's dense output, from here to the end and not piece by piece,
 //! keeps clear of the level by the margin that a search asks for. All else is left to the search.
 
-use super::crossing::{LocationMethod, is_clear_of, is_unreachable, level_of_dense, location_method};
+use super::crossing::{LocationMethod, is_clear_of, level_of_dense, location_method, reachable};
 use super::signs::{Reach, is_at, reach};
 use crate::trajectory::Trajectory;
 use crate::world::World;
@@ -38,33 +38,27 @@ impl Outlook<'_> {
     /// True if it is plain that no atom changes its sign before the end, nor comes near to it.
     pub fn is_quiet(&self) -> bool {
         let Outlook { state, rule, .. } = self;
-        if self.solution.error <= 0.0 || state.next.near != 0 || !state.next.changes().is_empty() {
+        if self.solution.error <= 0.0 || state.next.near() != 0 || !state.next.changes().is_empty() {
             return false;
         }
         let end = self.solution.end;
-        let are_formulas_free = state.free_until - end.to_f64() > 2.0 * LATER * end.resolution();
-        rule.zero_crossings(state.solve.get()).iter().enumerate().all(|(atom, crossing)| {
-            is_unreachable(rule, state, atom)
-                || match location_method(crossing, state) {
-                    LocationMethod::Never => true,
-                    LocationMethod::Formula(variable, level) => {
-                        are_formulas_free || self.is_met_later(variable, level, state.signs[atom])
-                    }
-                    LocationMethod::Search => self.keeps_clear(crossing, state.signs[atom]),
-                }
+        let are_formulas_free = state.horizon - end.to_f64() > 2.0 * LATER * end.resolution();
+        reachable(rule, state).all(|(atom, crossing)| match location_method(crossing, state) {
+            LocationMethod::Never => true,
+            LocationMethod::Formula(variable, level) => {
+                are_formulas_free || self.is_met_later(variable, level, state.signs[atom])
+            }
+            LocationMethod::Search => self.keeps_clear(crossing, state.signs[atom]),
         })
     }
 
-    /// The time before which no variable with a formula meets its level: see [`State::free_until`].
+    /// The time before which no variable with a formula meets its level: see [`State::horizon`].
     pub fn free_until(&self) -> f64 {
         let Outlook { state, rule, .. } = self;
-        let atoms = rule.zero_crossings(state.solve.get()).iter().enumerate();
         let meetings =
-            atoms.filter(|(atom, _)| !is_unreachable(rule, state, *atom)).filter_map(|(_, crossing)| {
-                match location_method(crossing, state) {
-                    LocationMethod::Formula(variable, level) => Some(self.meeting(variable, level)),
-                    LocationMethod::Never | LocationMethod::Search => None,
-                }
+            reachable(rule, state).filter_map(|(_, crossing)| match location_method(crossing, state) {
+                LocationMethod::Formula(variable, level) => Some(self.meeting(variable, level)),
+                LocationMethod::Never | LocationMethod::Search => None,
             });
         let time = |met: Meeting| match met {
             Meeting::Unknown => f64::NEG_INFINITY,

@@ -14,7 +14,7 @@
 
 use smallvec::SmallVec;
 
-use crate::detect::crossing::{Crossing, CrossingDetector, LocationMethod, is_unreachable, location_method};
+use crate::detect::crossing::{Crossing, CrossingDetector, LocationMethod, location_method, reachable};
 use crate::detect::doubt::{AtomQuery, Lookahead};
 use crate::detect::signs::{matters, produces};
 use crate::world::path::Path;
@@ -102,7 +102,7 @@ impl CrossingDetector {
         if rule.atoms.is_empty() {
             return SearchResult::default();
         }
-        let mut now = Signs::from_slice(&state.signs);
+        let mut now = state.signs.clone();
         for change in state.next.changes() {
             now[change.atom()] = change.after;
         }
@@ -124,10 +124,7 @@ impl Search<'_, '_> {
     fn track_atoms(&mut self) {
         let (path, rule, state) = (self.path, self.path.rule, self.path.state);
         let mut measured = false;
-        for (atom, crossing) in rule.zero_crossings(state.solve.get()).iter().enumerate() {
-            if is_unreachable(rule, state, atom) {
-                continue;
-            }
+        for (atom, crossing) in reachable(rule, state) {
             match location_method(crossing, state) {
                 LocationMethod::Never => {}
                 LocationMethod::Formula(variable, level) => self.track_formula(atom, variable, level),
@@ -140,7 +137,7 @@ impl Search<'_, '_> {
                     }
                     if let Some(tolerance) = self.detector.may_change(path, atom, self.now[atom]) {
                         let tolerance = self.detector.away_from_pole(path, atom, tolerance);
-                        let near = atom < 64 && state.next.near & 1 << atom != 0;
+                        let near = atom < 64 && state.next.near() & 1 << atom != 0;
                         let decides = self.decides(atom);
                         let ahead = self.look_ahead(atom, tolerance, 0.0, near, decides);
                         self.tracked.push(TrackedAtom { atom, tolerance, ahead });
@@ -254,7 +251,7 @@ impl Search<'_, '_> {
                 }
             })
             .collect();
-        let (mut at, mut after) = (Signs::from_slice(&self.now), Signs::from_slice(&self.now));
+        let (mut at, mut after) = (self.now.clone(), self.now.clone());
         let mut group: SmallVec<[Change; 1]> = SmallVec::new();
         let Search { detector, path, now, tracked, .. } = self;
         for (tracked, together) in tracked.iter().zip(together) {

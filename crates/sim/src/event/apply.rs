@@ -93,6 +93,9 @@ impl EventStage<'_, '_> {
         for fire in firing.iter() {
             self.materialise(fire.id);
         }
+        if lazy.is_empty() {
+            return;
+        }
         let mut all = Vec::new();
         for &slot in lazy {
             let id = self.world.tree.id(slot);

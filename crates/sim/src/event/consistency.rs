@@ -143,7 +143,7 @@ impl EventStage<'_, '_> {
         let Solved { places, before, values } = solved;
         let mut changed = Changed::default();
         for ((of, &before), &value) in places.iter().zip(before).zip(values) {
-            let id = of.module;
+            let (id, _) = of.owner(&self.world.tree);
             let state = self.world.state(id).expect("wanted");
             let in_question = self.events.ready.contains(&id) && state.open.is_none();
             let elsewhere = in_question || state.open.as_ref().is_some_and(|open| open.flow.is_none());

@@ -171,7 +171,7 @@ impl EventStage<'_, '_> {
         let (signs, clear, was_open) = match self.world.state(id).is_some() {
             true => self.signs_anew(id, rule, context, given),
             false => {
-                self.world.rebase_with(id, self.instant.at, given);
+                self.world.give(id, given);
                 let (signs, clear) = self.signs_of_values(id, compiled, context, None);
                 self.world.new_state(id);
                 (signs, clear, false)
@@ -185,7 +185,7 @@ impl EventStage<'_, '_> {
         state.signs = signs;
         state.switches.clear();
         state.next = if state.rule.get() == Some(rule) { state.next.again() } else { Default::default() };
-        (state.since, state.free_until) = (self.instant.at, f64::NAN);
+        (state.since, state.horizon) = (self.instant.at, f64::NAN);
         if compiled.is_plain() {
             // Nothing to judge and nothing to choose.
             state.put_under(rule, (!compiled.solves.is_empty()).then_some(0));
@@ -233,7 +233,7 @@ impl EventStage<'_, '_> {
         let now = self.instant.at;
         let state = self.world.state_mut(id)?;
         state.pass_changes(now);
-        (state.rule.get() == Some(rule)).then(|| Signs::from_slice(&state.signs))
+        (state.rule.get() == Some(rule)).then(|| state.signs.clone())
     }
 
     /// The modules whose rules have contexts, in string order.

@@ -160,7 +160,7 @@ impl EventStage<'_, '_> {
             let entry = open(state);
             entry.tried.clear();
             (entry.flips, entry.chosen) = (0, 0);
-            let guess = Signs::from_slice(&entry.guess);
+            let guess = entry.guess.clone();
             state.solve = next_clause(rule, &guess, &[]).into();
             state.switches = switches(rule, state.solve.get(), &guess);
         }
@@ -331,7 +331,7 @@ impl EventStage<'_, '_> {
         let known = state.open.as_ref().expect("open");
         let elsewhere = known.flow.is_none();
         if rule.atoms.is_empty() || (known.clear || !elsewhere) && !known.at.contains(&Sign::Zero) {
-            return (Signs::from_slice(&known.at), false);
+            return (known.at.clone(), false);
         }
         let mut entry = known.clone();
         let mut snapped = false;

@@ -106,7 +106,8 @@ impl FlowStage<'_, '_> {
         let mut values = before.clone();
         let rules = &self.setup.model.rules;
         if let Err(fault) = Equations::new(&system, rules, None).make_consistent(0.0, &mut values) {
-            return Err(self.unsolved(fault, system.owner(fault.component()), self.instant.at));
+            let owner = system.owner(fault.component(), &self.world.tree);
+            return Err(self.unsolved(fault, owner, self.instant.at));
         }
         Ok(Solved { places: system.table.places, before, values })
     }
@@ -130,7 +131,8 @@ impl FlowStage<'_, '_> {
         let (system, mut y) = instant_system(self.setup.model, self.world, at, &wanted, true);
         let answer = Equations::new(&system, &self.setup.model.rules, None).make_consistent(0.0, &mut y);
         if let Err(fault) = answer {
-            return Err(self.unsolved(fault, system.owner(fault.component()), at));
+            let owner = system.owner(fault.component(), &self.world.tree);
+            return Err(self.unsolved(fault, owner, at));
         }
         for (of, &value) in system.table.places.iter().zip(&y) {
             self.world.tree.set_value(of.place as usize, value);

@@ -189,7 +189,7 @@ impl FlowStage<'_, '_> {
         let state = self.world.state_mut(id).expect("a module with a rule");
         state.since = now;
         state.numeric_only = numeric_only;
-        (state.window, state.free_until) = (0.0, f64::NAN);
+        state.horizon = f64::NAN;
         if let Some(step) = &mut state.step {
             step.live = false;
         }
@@ -219,14 +219,14 @@ impl FlowStage<'_, '_> {
         } else if searched {
             let World { tree, states, stretch, .. } = &mut *self.world;
             let state = states.get_mut(id.slot()).expect("a module with a rule");
-            let h = if state.window > 0.0 {
-                WIDENING * state.window
+            let h = if state.horizon > 0.0 {
+                WIDENING * state.horizon
             } else {
                 closed_form::time_scale(state, tree)
             };
             // Not shorter than time itself can tell.
             let h = h.min(CHANGES * *stretch).max(64.0 * from.resolution());
-            state.window = h;
+            state.horizon = h;
             (h, 1.0)
         } else {
             (1.0, f64::INFINITY)
@@ -249,9 +249,10 @@ impl FlowStage<'_, '_> {
         };
         let state = self.world.state_mut(id).expect("seen above");
         let lasting = limit.is_infinite();
-        let (near, before, index) = (found.near, state.next.near, state.rule.get());
+        let (near, before, index) = (found.near, state.next.near(), state.rule.get());
         state.next = Next::new(kind, found.touched, &found.changes);
-        (state.next.lasting, state.next.near) = (lasting, near);
+        state.next.lasting = lasting;
+        state.next.set_near(near);
         if kind == NextKind::Nothing {
             self.schedule.cancel(who);
         } else {

@@ -32,7 +32,7 @@ impl FlowStage<'_, '_> {
             return false;
         };
         let (Some(twin), Some(own)) = (self.world.state(last.id), self.world.state(id)) else { return false };
-        if last.near != own.next.near || !self.are_twins(own, twin) {
+        if last.near != own.next.near() || !self.are_twins(own, twin) {
             return false;
         }
         let Some(step) = twin.step.as_ref().filter(|step| step.live && step.dense.start == from).cloned()
@@ -40,7 +40,7 @@ impl FlowStage<'_, '_> {
             return false;
         };
         let (next, rule) = (twin.next.clone(), twin.rule.get());
-        let near = next.near;
+        let near = next.near();
         let own = self.world.state_mut(id).expect("seen above");
         (own.step, own.next) = (Some(step), next);
         self.schedule.schedule(Owner::Module(id.slot() as u32), last.at);

@@ -102,7 +102,7 @@ impl IndexedQueue {
             Owner::Tick => &mut self.tick,
             Owner::Module(slot) => {
                 let slot = slot as usize;
-                room::lengthen(&mut self.serials, slot + 1, || 0);
+                room::cover(&mut self.serials, slot, || 0);
                 &mut self.serials[slot]
             }
         }
@@ -110,14 +110,21 @@ impl IndexedQueue {
 
     /// Removes the entry of an owner.
     pub fn cancel(&mut self, owner: Owner) {
+        if let Owner::Module(slot) = owner
+            && slot as usize >= self.serials.len()
+        {
+            // It has never had one.
+            return;
+        }
         let serial = self.serial(owner);
         *serial = serial.wrapping_add(1);
     }
 
     /// Puts in the entry of an owner, in place of its earlier one.
     pub fn schedule(&mut self, owner: Owner, at: SimTime) {
-        self.cancel(owner);
-        let serial = *self.serial(owner);
+        let serial = self.serial(owner);
+        *serial = serial.wrapping_add(1);
+        let serial = *serial;
         if self.heap.len() == self.heap.capacity() {
             self.heap.reserve_exact(room::step(self.heap.len()));
         }

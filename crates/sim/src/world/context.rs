@@ -10,11 +10,30 @@ use dlsys_tree::ModuleId;
 
 /// The modules that a rule looks at: those of its context in the order of its variables, then, for each of its
 /// aggregates, those attached to it that match.
-#[derive(Debug, Default, PartialEq)]
-pub struct Context {
-    modules: SmallVec<[ModuleId; 2]>,
+#[derive(Clone, Debug, Default)]
+pub struct Context(Kept);
+
+/// Most modules look at no more than two others, and there are millions of them: these stand in place.
+const FEW: usize = 2;
+
+#[derive(Clone, Debug)]
+enum Kept {
+    Few { count: u8, modules: [ModuleId; FEW] },
+    Many(Box<Many>),
+}
+
+impl Default for Kept {
+    fn default() -> Kept {
+        Kept::Few { count: 0, modules: [ModuleId::default(); FEW] }
+    }
+}
+
+/// Any number of modules.
+#[derive(Clone, Debug)]
+struct Many {
+    modules: Vec<ModuleId>,
     /// Those behind the context; few rules have aggregates.
-    attached: Option<Box<Attached>>,
+    attached: Option<Attached>,
 }
 
 /// The modules behind the context: those that aggregates look at.
@@ -26,18 +45,15 @@ struct Attached {
     ends: SmallVec<[u32; 2]>,
 }
 
-impl Clone for Context {
-    fn clone(&self) -> Context {
-        // A copy of the memory: element by element takes several times as long, and an event copies five.
-        Context { modules: SmallVec::from_slice(&self.modules), attached: self.attached.clone() }
-    }
-}
-
 impl Deref for Context {
     type Target = [ModuleId];
 
+    #[inline]
     fn deref(&self) -> &[ModuleId] {
-        &self.modules
+        match &self.0 {
+            Kept::Few { count, modules } => &modules[..usize::from(*count)],
+            Kept::Many(many) => &many.modules,
+        }
     }
 }
 
@@ -46,57 +62,102 @@ impl<'a> IntoIterator for &'a Context {
     type IntoIter = std::slice::Iter<'a, ModuleId>;
 
     fn into_iter(self) -> Self::IntoIter {
-        self.modules.iter()
+        self.iter()
+    }
+}
+
+impl PartialEq for Context {
+    fn eq(&self, other: &Context) -> bool {
+        self[..] == other[..] && self.attached() == other.attached()
     }
 }
 
 impl Context {
+    /// The same modules, to be changed.
+    fn modules_mut(&mut self) -> &mut [ModuleId] {
+        match &mut self.0 {
+            Kept::Few { count, modules } => &mut modules[..usize::from(*count)],
+            Kept::Many(many) => &mut many.modules,
+        }
+    }
+
+    fn attached(&self) -> Option<&Attached> {
+        match &self.0 {
+            Kept::Many(many) => many.attached.as_ref(),
+            _ => None,
+        }
+    }
+
+    /// The same modules with room for any number of them.
+    fn many(&mut self) -> &mut Many {
+        if !matches!(self.0, Kept::Many(_)) {
+            self.0 = Kept::Many(Box::new(Many { modules: self.to_vec(), attached: None }));
+        }
+        match &mut self.0 {
+            Kept::Many(many) => many,
+            _ => unreachable!("it has just been made"),
+        }
+    }
+
+    #[inline]
     pub fn clear(&mut self) {
-        self.modules.clear();
-        self.attached = None;
+        self.0 = Kept::default();
     }
 
     /// Adds a module of the context.
+    #[inline]
     pub fn push(&mut self, id: ModuleId) {
-        self.modules.push(id);
+        match &mut self.0 {
+            Kept::Few { count, modules } if usize::from(*count) < FEW => {
+                modules[usize::from(*count)] = id;
+                *count += 1;
+            }
+            Kept::Few { .. } | Kept::Many(_) => self.many().modules.push(id),
+        }
     }
 
     /// Takes back all modules of the context but so many.
     pub fn truncate(&mut self, context: usize) {
-        self.modules.truncate(context);
+        match &mut self.0 {
+            Kept::Few { count, .. } if usize::from(*count) > context => *count = context as u8,
+            Kept::Few { .. } => {}
+            Kept::Many(many) => many.modules.truncate(context),
+        }
     }
 
     /// Puts a module in the place of another.
     pub fn exchange(&mut self, old: ModuleId, new: ModuleId) {
-        self.modules.iter_mut().filter(|id| **id == old).for_each(|id| *id = new);
+        self.modules_mut().iter_mut().filter(|id| **id == old).for_each(|id| *id = new);
     }
 
     /// Turns round the first modules of the context.
     pub fn reverse(&mut self, first: usize) {
-        self.modules[..first].reverse();
+        self.modules_mut()[..first].reverse();
     }
 
     /// Adds the children that an aggregate looks at.
     pub fn push_children(&mut self, children: impl Iterator<Item = ModuleId>) {
-        let context = self.modules.len() as u32;
-        self.modules.extend(children);
-        let attached =
-            self.attached.get_or_insert_with(|| Box::new(Attached { context, ends: SmallVec::new() }));
-        attached.ends.push(self.modules.len() as u32);
+        let Many { modules, attached } = self.many();
+        let context = modules.len() as u32;
+        modules.extend(children);
+        let attached = attached.get_or_insert_with(|| Attached { context, ends: SmallVec::new() });
+        attached.ends.push(modules.len() as u32);
     }
 
     /// The context alone.
     pub fn context(&self) -> &[ModuleId] {
-        &self.modules
-            [..self.attached.as_ref().map_or(self.modules.len(), |attached| attached.context as usize)]
+        match self.attached() {
+            Some(attached) => &self[..attached.context as usize],
+            None => self,
+        }
     }
 
     /// The children of one aggregate.
     pub fn children(&self, aggregate: usize) -> &[ModuleId] {
-        let Some(Attached { context, ends }) = self.attached.as_deref() else { return &[] };
+        let Some(Attached { context, ends }) = self.attached() else { return &[] };
         let end = |i: usize| ends.get(i).copied().unwrap_or(*context) as usize;
         let from = aggregate.checked_sub(1).map_or(*context as usize, end);
-        &self.modules[from..end(aggregate).max(from)]
+        &self[from..end(aggregate).max(from)]
     }
 }
 

@@ -129,6 +129,9 @@ impl CoupledSolution {
     /// Bounds of a component from an instant to the end; None for one that has not been integrated yet.
     pub fn hull(&self, component: usize, from: SimTime) -> Option<Interval> {
         let Track { first, count, component } = self.track(component);
+        if count == 1 {
+            return Some(self.stretches[first as usize].bounds(component as usize));
+        }
         let own = &self.stretches[first as usize..(first + count) as usize];
         // The last one is there however late it is.
         let passed = own.iter().take_while(|dense| from.since(dense.end) >= 0.0).count();

@@ -1,7 +1,7 @@
 //! The world: the modules of the structure and how their parameters move.
 //!
 //! - [`World`]: the tree, the states of materialised modules, the lives of lazy ones, the solution of the coupled ones
-//! - [`state`], [`states`]: rule, clause, signs, trajectories and next event of one module, and of all of them
+//! - [`state`], [`states`]: rule, clause, signs ([`short`]), trajectories and next event of one module, and of all of them
 //! - [`path`], [`course`]: the variables of a rule along a stretch of time, and at one instant after another
 //! - [`prefetch`]: memory that is asked for before it is read
 //! - [`context`], [`neighbours`]: the modules that a rule reads, and the modules that read one
@@ -15,6 +15,7 @@ pub mod neighbours;
 pub mod new_modules;
 pub mod path;
 pub mod prefetch;
+mod short;
 pub mod state;
 pub mod states;
 
@@ -175,7 +176,7 @@ impl World {
             self.tree.set_value(place, value);
         }
         let Some(state) = self.state_mut(id) else { return };
-        (state.since, state.free_until) = (at, f64::NAN);
+        (state.since, state.horizon) = (at, f64::NAN);
         for trajectory in &mut state.trajectories {
             *trajectory = Trajectory::Rest;
         }

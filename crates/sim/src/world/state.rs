@@ -4,13 +4,14 @@ use smallvec::SmallVec;
 
 use crate::trajectory::Trajectory;
 use crate::world::context::Context;
+use crate::world::short::Short;
 use dlsys_model::Sign;
 pub use dlsys_ode::Control;
 use dlsys_ode::Dense;
 use dlsys_tree::{ModuleId, SimTime};
 
-pub type Signs = SmallVec<[Sign; 8]>;
-pub type Switches = SmallVec<[bool; 8]>;
+pub type Signs = Short<Sign>;
+pub type Switches = Short<bool>;
 
 /// A module's rule, its equations, and how far it is known to go.
 #[derive(Clone, Debug)]
@@ -33,17 +34,15 @@ pub struct State {
     pub trajectories: SmallVec<[Trajectory; 2]>,
     /// The module's own step, if it is integrated alone.
     pub step: Option<Box<Step>>,
-    /// Length of the last stretch of formulas that was searched; 0 if none was.
-    pub window: f64,
-    /// The time before which no formula of a coupled module meets a level; infinitely early if that is not known, NaN if it has
-    /// not been asked. Every step of its neighbours asks.
-    pub free_until: f64,
+    /// How far formulas have been looked at; NaN if they have not. Of a coupled module, the time before which none of them meets a level, which every
+    /// step of its neighbours asks for; infinitely early if that is not known. Of any other, the length of the last stretch that was searched.
+    pub horizon: f64,
     /// All equations are integrated numerically, formulas or not.
     pub numeric_only: bool,
     /// It is integrated together with its neighbours.
     pub coupled: bool,
     /// Number of the last walk through neighbours that came by.
-    pub visited: u64,
+    pub visited: u32,
     pub next: Next,
     /// Set while an instant is examined that concerns the module.
     pub open: Option<Box<Open>>,
@@ -105,8 +104,6 @@ pub struct Next {
     pub kind: NextKind,
     /// All this follows from formulas, and holds whatever a common step brings.
     pub lasting: bool,
-    /// Atoms, one bit each, whose sides are nearer each other than the error of integration.
-    pub near: u64,
     /// Some signs change before then.
     has_changes: bool,
     /// Signs that change. Most coupled modules have none before their common step ends, and every step reads their states.
@@ -120,6 +117,8 @@ struct Ahead {
     changes: SmallVec<[Change; 1]>,
     /// The number of the former.
     touched: u32,
+    /// See [`Next::near`].
+    near: u64,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -147,15 +146,30 @@ impl Next {
 
     /// Nothing known, of a module that goes on.
     pub fn again(&self) -> Next {
-        Next { near: self.near, ..Next::default() }
+        let mut next = Next::default();
+        next.set_near(self.near());
+        next
+    }
+
+    /// Atoms, one bit each, whose sides are nearer each other than the error of integration: mostly none.
+    pub fn near(&self) -> u64 {
+        self.ahead.as_ref().map_or(0, |ahead| ahead.near)
+    }
+
+    pub fn set_near(&mut self, near: u64) {
+        match &mut self.ahead {
+            Some(ahead) => ahead.near = near,
+            None if near == 0 => {}
+            None => self.ahead = Some(Box::new(Ahead { near, ..Ahead::default() })),
+        }
     }
 
     /// Forgets all, but not its memory.
     fn clear(&mut self) {
-        (self.kind, self.lasting, self.near, self.has_changes) = (NextKind::Nothing, false, 0, false);
+        (self.kind, self.lasting, self.has_changes) = (NextKind::Nothing, false, false);
         if let Some(ahead) = &mut self.ahead {
             ahead.changes.clear();
-            ahead.touched = 0;
+            (ahead.touched, ahead.near) = (0, 0);
         }
     }
 
@@ -301,13 +315,12 @@ impl State {
             rule: Index::NONE,
             solve: Index::NONE,
             context: Context::default(),
-            switches: SmallVec::new(),
-            signs: SmallVec::new(),
+            switches: Switches::new(),
+            signs: Signs::new(),
             since: SimTime::ZERO,
             trajectories: SmallVec::new(),
             step: None,
-            window: 0.0,
-            free_until: f64::NAN,
+            horizon: f64::NAN,
             numeric_only: false,
             coupled: false,
             visited: 0,
@@ -325,7 +338,7 @@ impl State {
         self.switches.clear();
         (self.step, self.open) = (None, None);
         self.next.clear();
-        (self.window, self.free_until) = (0.0, f64::NAN);
+        self.horizon = f64::NAN;
         (self.numeric_only, self.coupled) = (false, false);
     }
 
@@ -367,8 +380,8 @@ impl State {
     /// Opens the module as one that was followed along its trajectory.
     pub fn follow(&mut self) -> &mut Open {
         if self.open.is_none() {
-            let flow = Some((self.solve.get(), Switches::from_slice(&self.switches)));
-            let (at, guess) = (Signs::from_slice(&self.signs), Signs::from_slice(&self.signs));
+            let flow = Some((self.solve.get(), self.switches.clone()));
+            let (at, guess) = (self.signs.clone(), self.signs.clone());
             self.open = Some(Box::new(Open { at, guess, flow, ..Open::default() }));
         }
         self.open.as_mut().expect("just opened")
@@ -377,7 +390,7 @@ impl State {
     /// Opens the module as one whose signs are known from its values only.
     pub fn place(&mut self, clear: bool) {
         let guess = self.signs.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect();
-        let at = Signs::from_slice(&self.signs);
+        let at = self.signs.clone();
         self.open = Some(Box::new(Open { at, guess, clear, ..Open::default() }));
     }
 

@@ -11,7 +11,7 @@ use dlsys_tree::{ModuleId, room};
 pub struct States(Vec<Option<Box<State>>>);
 
 impl States {
-    /// The number of slots that may have a state.
+    /// The number of slots for which there is room.
     pub fn slots(&self) -> usize {
         self.0.len()
     }
@@ -30,8 +30,13 @@ impl States {
 
     /// The state in the slot of a module; a new one if there is none.
     pub fn make(&mut self, id: ModuleId) -> &mut State {
-        room::lengthen(&mut self.0, id.slot() + 1, || None);
+        room::cover(&mut self.0, id.slot(), || None);
         self.0[id.slot()].get_or_insert_with(|| Box::new(State::new(id)))
+    }
+
+    /// All states, to be changed.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut State> {
+        self.0.iter_mut().flatten().map(|state| &mut **state)
     }
 
     /// All states, by slot.

@@ -120,7 +120,8 @@ impl Equations<'_> {
             misfits.retain(|misfit| misfit.1 > 0.0);
             if !misfits.is_empty() {
                 misfits.sort_unstable_by_key(|misfit| misfit.0);
-                (stretch.error, stretch.misfits) = (stretch.error.max(f64::EPSILON), misfits);
+                (stretch.error, stretch.misfits) =
+                    (stretch.error.max(f64::EPSILON), misfits.into_boxed_slice());
             }
             stretches.push(stretch);
             last = end;

@@ -154,6 +154,8 @@ impl System {
         let (rule, clause) = (&rules[key.rule], &rules[key.rule].solves[key.solve]);
         let (time, switches) = (rule.time_variable(), rule.variables);
         self.lanes.begin_chunk();
+        // Mostly two modules read a neighbour, one as its left neighbour and the other as its right one.
+        let shared = self.table.formulas.len();
         for &variable in key.program(rules).reads() {
             let column = if variable == time {
                 LaneColumn::Time
@@ -171,8 +173,8 @@ impl System {
                             (module, world.state(module))
                         }
                     };
-                    let x = || world.tree.parameters(module)[read.parameter];
-                    table.source(moves, read.parameter, x, unknown)
+                    let place = || world.tree.places(module).start + read.parameter;
+                    table.source(moves, read.parameter, (world.tree.values(), place), shared, unknown)
                 });
                 lanes.column(components, sources)
             };

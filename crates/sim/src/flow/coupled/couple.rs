@@ -53,7 +53,7 @@ impl FlowStage<'_, '_> {
         for &id in freed {
             let now = self.instant.at;
             let state = self.world.state_mut(id).expect("seen above");
-            state.coupled = false;
+            (state.coupled, state.horizon) = (false, f64::NAN);
             state.pass_changes(now);
             if !state.has_restarted(self.instant.number) {
                 self.world.rebase(id, now);
@@ -65,7 +65,9 @@ impl FlowStage<'_, '_> {
         for &id in seeds {
             let now = self.instant.at;
             let state = self.world.state_mut(id).expect("seen above");
-            state.coupled = true;
+            if !state.coupled {
+                (state.coupled, state.horizon) = (true, f64::NAN);
+            }
             state.pass_changes(now);
             // Closed forms continue as they were, whatever their module reads.
             if !state.next.lasting || state.has_restarted(self.instant.number) {
@@ -139,7 +141,7 @@ impl FlowStage<'_, '_> {
                 near.extend_from_slice(&state.context);
             }
         }
-        let visit = self.flows.coupled.reintegration.begin_visit();
+        let visit = self.flows.coupled.reintegration.begin_visit(&mut self.world.states);
         near.retain(|id| {
             let state = self.world.state_mut(*id);
             state.is_some_and(|state| std::mem::replace(&mut state.visited, visit) != visit)

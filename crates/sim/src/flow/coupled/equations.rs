@@ -29,6 +29,8 @@ pub struct Equations<'s> {
 pub struct RateWorkspace {
     /// Values of the inputs at `read_at`.
     pub inputs: Vec<f64>,
+    /// Values of the closed forms at that time, in systems without a table, whose rows read all of them.
+    formulas: Vec<f64>,
     /// The time at which the inputs were read, since the start of the step.
     read_at: Option<f64>,
     /// Components, then inputs.
@@ -69,6 +71,10 @@ impl<'s> Equations<'s> {
         // The last stages of a step have the same time.
         if self.memory.read_at != Some(tau) {
             self.system.table.read(self.solution, tau, &mut self.memory.inputs);
+            self.memory.formulas.clear();
+            if self.system.is_bare {
+                self.system.table.read_formulas(tau, &mut self.memory.formulas);
+            }
             self.memory.read_at = Some(tau);
         }
     }
@@ -185,13 +191,13 @@ impl Rates for Equations<'_> {
         let consistent = std::mem::take(&mut self.memory.consistent);
         let y = if system.algebra.is_empty() { y } else { &consistent };
         self.add_up(tau, y);
-        let RateWorkspace { inputs, known, aggregates, registers, .. } = &mut self.memory;
+        let RateWorkspace { inputs, known, aggregates, formulas, registers, .. } = &mut self.memory;
         known.clear();
         if !inputs.is_empty() {
             known.extend_from_slice(y);
             known.extend_from_slice(inputs);
         }
-        let point = EvaluationPoint { tau, y, inputs, known, aggregates };
+        let point = EvaluationPoint { tau, y, inputs, known, aggregates, formulas };
         system.lanes.rates(&system.table, self.rules, &point, registers, out);
         for unknown in &system.algebra.unknowns {
             out[unknown.component as usize] = 0.0;

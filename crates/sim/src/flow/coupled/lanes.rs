@@ -92,6 +92,8 @@ pub struct EvaluationPoint<'r> {
     pub known: &'r [f64],
     /// The aggregates.
     pub aggregates: &'r [f64],
+    /// The closed forms; empty if each row that reads one computes it.
+    pub formulas: &'r [f64],
 }
 
 impl LaneBatches {
@@ -207,10 +209,12 @@ impl LaneBatches {
                     self.places.push(components as u32 + input);
                 }
                 other => {
-                    mixed.extend(self.places.drain(place..).map(|place| match place {
-                        place if (place as usize) < components => VariableSource::State(place),
-                        place => VariableSource::Input(place - components as u32),
-                    }));
+                    if mixed.is_empty() {
+                        mixed.extend(self.places.drain(place..).map(|place| match place {
+                            place if (place as usize) < components => VariableSource::State(place),
+                            place => VariableSource::Input(place - components as u32),
+                        }));
+                    }
                     mixed.push(other);
                 }
             }
@@ -301,7 +305,12 @@ impl LaneBatches {
                 // There are no known inputs if the table has none.
                 pick(if point.known.is_empty() { point.y } else { point.known }, first, to);
                 for (lane, source) in &self.others[from..end] {
-                    to[*lane as usize] = table.value(*source, tau, point.y, point.inputs);
+                    to[*lane as usize] = match *source {
+                        VariableSource::Formula(i) if !point.formulas.is_empty() => {
+                            point.formulas[i as usize]
+                        }
+                        source => table.value(source, tau, point.y, point.inputs),
+                    };
                 }
             }
         }

@@ -38,6 +38,7 @@ use crate::world::coupled_solution::{CoupledSolution, value_of};
 use crate::world::neighbours::reads;
 use crate::world::prefetch::{fetch, is_large};
 use crate::world::state::{Control, State};
+use crate::world::states::States;
 use dlsys_ode::Dense;
 use dlsys_tree::{ModuleId, SimTime, room};
 use smallvec::SmallVec;
@@ -64,7 +65,7 @@ pub struct Reintegration {
     stages: StagesOfSteps,
     y: Vec<f64>,
     /// Id of the last traversal of modules.
-    visit: u64,
+    visit: u32,
 }
 
 /// The reason why modules are integrated again.
@@ -154,7 +155,12 @@ impl Reintegration {
     }
 
     /// The id of a new traversal of modules, which distinguishes the modules that it has visited.
-    pub fn begin_visit(&mut self) -> u64 {
+    pub fn begin_visit(&mut self, states: &mut States) -> u32 {
+        if self.visit == u32::MAX {
+            // From the beginning, and no state remembers any of them.
+            states.iter_mut().for_each(|state| state.visited = 0);
+            self.visit = 0;
+        }
         self.visit += 1;
         self.visit
     }
@@ -300,7 +306,7 @@ impl FlowStage<'_, '_> {
 
     /// Makes the region of the seeds and `rings` rings around them.
     fn surround(&mut self, region: &mut Region, seeds: &[ModuleId], rings: usize) {
-        let visit = self.flows.coupled.reintegration.begin_visit();
+        let visit = self.flows.coupled.reintegration.begin_visit(&mut self.world.states);
         let is_large = is_large(self.world);
         let Region { members, rings: begins } = region;
         members.clear();

@@ -36,7 +36,8 @@ impl FlowStage<'_, '_> {
         self.show_coupled(from);
         let rough = self.flows.coupled.integrator.rough().to_vec();
         rough.chunk_by(|a, b| b - a <= APART).all(|near| {
-            let owner = |component: &u32| self.flows.coupled.system.owner(*component as usize);
+            let tree = &self.world.tree;
+            let owner = |component: &u32| self.flows.coupled.system.owner(*component as usize, tree);
             let mut seeds: Vec<ModuleId> = near.iter().filter_map(owner).map(|(id, _)| id).collect();
             seeds.dedup();
             self.resolve(&seeds, from)

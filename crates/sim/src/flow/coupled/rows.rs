@@ -7,7 +7,7 @@ use crate::flow::coupled::lanes::ProgramKey;
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::CoupledSolution;
 use dlsys_model::Rule;
-use dlsys_tree::{ModuleId, SimTime};
+use dlsys_tree::{ModuleId, SimTime, Tree};
 
 /// The origin of the value of a rule's variable.
 #[derive(Clone, Copy, Debug)]
@@ -56,21 +56,28 @@ pub struct EquationTable {
 pub struct ComponentPlace {
     /// The place in the values of the tree.
     pub place: u32,
-    /// The parameter of the module.
-    pub parameter: u32,
-    pub module: ModuleId,
+    /// The slot of the module: its generation, and which of its parameters this is, the tree tells.
+    slot: u32,
 }
 
 impl ComponentPlace {
-    /// Of a parameter of a module whose parameters begin at a place in the values of the tree.
+    /// Of a parameter of a living module whose parameters begin at a place in the values of the tree.
     pub fn new(first: usize, module: ModuleId, parameter: usize) -> ComponentPlace {
-        ComponentPlace { place: (first + parameter) as u32, parameter: parameter as u32, module }
+        ComponentPlace { place: (first + parameter) as u32, slot: module.slot() as u32 }
+    }
+
+    /// The module, as long as it lives, and its parameter.
+    pub fn owner(self, tree: &Tree) -> (ModuleId, usize) {
+        let module = tree.id(self.slot);
+        (module, self.place as usize - tree.places(module).start)
     }
 }
 
 /// A parameter with a closed form that rows read.
 #[derive(Clone, Debug)]
 pub struct FormulaInput {
+    /// The place of the parameter in the values of the tree.
+    pub(super) place: u32,
     /// The closed form.
     pub trajectory: Trajectory,
     /// The value at the start of the trajectory.
@@ -200,6 +207,12 @@ impl EquationTable {
         }
     }
 
+    /// The values of all closed forms at a time after the start.
+    pub fn read_formulas(&self, tau: f64, out: &mut Vec<f64>) {
+        out.clear();
+        out.extend(self.formulas.iter().map(|of| of.trajectory.at(of.x, of.offset + tau)));
+    }
+
     /// The value of a source at a time after the start, given the components and the inputs; 0 for an aggregate.
     pub fn value(&self, source: VariableSource, tau: f64, y: &[f64], inputs: &[f64]) -> f64 {
         match source {
@@ -250,7 +263,7 @@ impl EquationTable {
     }
 
     /// The module, and its parameter, that a component belongs to.
-    pub fn owner(&self, component: usize) -> Option<(ModuleId, usize)> {
-        self.places.get(component).map(|of| (of.module, of.parameter as usize))
+    pub fn owner(&self, component: usize, tree: &Tree) -> Option<(ModuleId, usize)> {
+        self.places.get(component).map(|of| of.owner(tree))
     }
 }

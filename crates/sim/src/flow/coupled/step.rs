@@ -191,7 +191,8 @@ impl FlowStage<'_, '_> {
         }
         Err(match unsolved {
             Some(unsolved) => {
-                self.unsolved(unsolved, self.flows.coupled.system.owner(unsolved.component()), from)
+                let system = &self.flows.coupled.system;
+                self.unsolved(unsolved, system.owner(unsolved.component(), &self.world.tree), from)
             }
             None => self.coupled_error(error, from),
         })
@@ -204,13 +205,17 @@ impl FlowStage<'_, '_> {
         if rule.atoms.is_empty() || state.next.lasting {
             return;
         }
-        if !needs_search(state, rule) {
+        // Of a module that needs no search, nobody asks how long its formulas meet nothing.
+        let is_known = !state.horizon.is_nan();
+        if !is_known && !needs_search(state, rule) {
             self.look_ahead(id, from).expect("no step is made");
             return;
         }
         self.show_coupled(from);
         let who = Owner::Module(id.slot() as u32);
-        self.ask_formulas(id, rule, from);
+        if !is_known {
+            self.ask_formulas(id, rule, from);
+        }
         let is_quiet = self.outlook(id, rule, from).is_some_and(|outlook| outlook.is_quiet());
         // Tests search all the same, and see that nothing is found.
         if is_quiet && !cfg!(debug_assertions) {
@@ -235,7 +240,8 @@ impl FlowStage<'_, '_> {
             let last = knot.since(solution.end) >= 0.0;
             let state = self.world.state_mut(id).expect("seen above");
             state.next.add_changes(&found.changes);
-            let (before, index) = (std::mem::replace(&mut state.next.near, found.near), state.rule.get());
+            let (before, index) = (state.next.near(), state.rule.get());
+            state.next.set_near(found.near);
             self.detector.note_approach(index.unwrap_or(0), found.near, before, knot);
             let state = self.world.state_mut(id).expect("seen above");
             if found.event.is_some() {
@@ -256,13 +262,11 @@ impl FlowStage<'_, '_> {
         Some(Outlook { world: self.world, solution, state, rule, from })
     }
 
-    /// Finds out how long no formula of a module meets a level, unless that has been asked since its trajectories began.
+    /// Finds out how long no formula of a module meets a level.
     fn ask_formulas(&mut self, id: ModuleId, rule: &Rule, from: SimTime) {
-        let Some(outlook) = self.outlook(id, rule, from).filter(|o| o.state.free_until.is_nan()) else {
-            return;
-        };
+        let Some(outlook) = self.outlook(id, rule, from) else { return };
         let free_until = outlook.free_until();
-        self.world.state_mut(id).expect("seen above").free_until = free_until;
+        self.world.state_mut(id).expect("seen above").horizon = free_until;
     }
 
     /// Advances the coupled modules to the end of their common step, and makes the next one.
@@ -311,7 +315,9 @@ impl FlowStage<'_, '_> {
     /// Handles equations that end where no common step leads on: a boundary there, of the module that a component
     /// belongs to or of one that it reads, has been reached. False if there is none.
     fn arrest_coupled(&mut self, component: usize, at: SimTime) -> bool {
-        let Some((id, _)) = self.flows.coupled.system.owner(component) else { return false };
+        let Some((id, _)) = self.flows.coupled.system.owner(component, &self.world.tree) else {
+            return false;
+        };
         let context = self.world.state(id).map(|s| s.context.to_vec()).unwrap_or_default();
         let all = std::iter::once(id).chain(context);
         let arrested: Vec<()> = all.filter_map(|id| self.arrest(id, at)).collect();
@@ -356,7 +362,7 @@ impl FlowStage<'_, '_> {
     /// The error of a common step that fails.
     fn coupled_error(&self, error: StepError, at: SimTime) -> Error {
         let Coupled { system, y, .. } = &self.flows.coupled;
-        let owner = |component: usize| system.owner(component);
+        let owner = |component: usize| system.owner(component, &self.world.tree);
         if matches!(error, StepError::StepTooSmall(_) | StepError::ValueNotFinite(_))
             && let Some(unsolved) = Equations::new(system, &self.setup.model.rules, None).fading(y)
         {

@@ -11,7 +11,7 @@ use crate::world::World;
 use crate::world::prefetch::prefetch;
 use crate::world::state::State;
 use dlsys_model::{Model, Rule, Solve};
-use dlsys_tree::{ModuleId, SimTime};
+use dlsys_tree::{ModuleId, SimTime, Tree};
 use smallvec::SmallVec;
 
 /// The equations of the coupled modules: a table, and the orders in which it is evaluated.
@@ -33,6 +33,9 @@ pub struct System {
 
 /// More modules than this are not likely to be in the processor's caches.
 pub(super) const REGION: usize = 256;
+
+/// No closed form is shared: in a table each row has its own.
+const NONE: usize = usize::MAX;
 
 /// The modules whose equations form a system.
 #[derive(Clone, Copy)]
@@ -99,8 +102,8 @@ impl System {
     }
 
     /// The module, and its parameter, that a component belongs to.
-    pub fn owner(&self, component: usize) -> Option<(ModuleId, usize)> {
-        self.table.owner(component)
+    pub fn owner(&self, component: usize, tree: &Tree) -> Option<(ModuleId, usize)> {
+        self.table.owner(component, tree)
     }
 
     /// Calls a function with the number of the rate, and the partial derivative, for each partial derivative of a row's
@@ -205,8 +208,8 @@ impl EquationTable {
                 None => (id, Some(state)),
                 Some(module) => (module, world.state(module)),
             };
-            let x = || world.tree.parameters(module)[read.parameter];
-            let source = self.source(moves, read.parameter, x, unknown);
+            let place = || world.tree.places(module).start + read.parameter;
+            let source = self.source(moves, read.parameter, (world.tree.values(), place), NONE, unknown);
             self.sources[first_source + read.variable] = source;
         }
     }
@@ -234,15 +237,18 @@ impl EquationTable {
         }
     }
 
-    /// The source of a parameter of a module with this state. `x` gives its value in the tree.
+    /// The source of a parameter of a module with this state, at a place in the values of the tree. Closed forms from number `shared` on
+    /// are there for all who read them.
     #[inline(always)]
     pub(super) fn source(
         &mut self,
         state: Option<&State>,
         parameter: usize,
-        x: impl Fn() -> f64,
+        (values, place): (&[f64], impl Fn() -> usize),
+        shared: usize,
         unknown: impl Fn(u32) -> Option<u32>,
     ) -> VariableSource {
+        let x = || values[place()];
         let Some((state, trajectory)) = state.and_then(|s| Some((s, s.trajectories.get(parameter)?))) else {
             return VariableSource::Fixed(x());
         };
@@ -256,8 +262,14 @@ impl EquationTable {
                 }
             },
             trajectory => {
+                let place = place() as u32;
+                let mut known = self.formulas.iter().skip(shared);
+                if let Some(number) = known.position(|formula| formula.place == place) {
+                    return VariableSource::Formula((shared + number) as u32);
+                }
+                let (trajectory, x) = (trajectory.clone(), x());
                 let (since, offset) = (state.since, self.start.since(state.since));
-                self.formulas.push(FormulaInput { trajectory: trajectory.clone(), x: x(), since, offset });
+                self.formulas.push(FormulaInput { place, trajectory, x, since, offset });
                 VariableSource::Formula(self.formulas.len() as u32 - 1)
             }
         }
@@ -276,8 +288,9 @@ impl EquationTable {
             world.values(module, self.start, &mut then);
             return then.into_iter().map(VariableSource::Fixed).collect();
         }
-        let (values, state) = (world.tree.parameters(module).iter().enumerate(), world.state(module));
-        values.map(|(i, &x)| self.source(state, i, || x, &unknown)).collect()
+        let (places, state) = (world.tree.places(module).enumerate(), world.state(module));
+        let values = world.tree.values();
+        places.map(|(i, place)| self.source(state, i, (values, || place), NONE, &unknown)).collect()
     }
 }
 
