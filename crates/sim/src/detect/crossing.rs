@@ -257,8 +257,11 @@ impl CrossingDetector {
         // resolution of time.
         let (mut from, mut tolerance) = (from, tolerance);
         let start = self.difference(path, atom).value(from);
-        if path.rule.jumping_whole[atom] && sign == Sign::Zero && start == 0.0 {
-            from = (from + self.blur(path, atom)).min(limit);
+        if path.rule.jumping_whole[atom] && start == 0.0 && sign != Sign::Any {
+            let behind = (from + self.blur(path, atom)).min(limit);
+            if sign == Sign::Zero || Sign::of(self.difference(path, atom).value(behind)) == sign {
+                from = behind;
+            }
         }
         if sign != Sign::Any && start != 0.0 && start * sign_of(sign) <= 0.0 {
             let size = self.out[2 * atom].abs().max(1.0);
