@@ -22,7 +22,10 @@ impl EventStage<'_, '_> {
         let rule = &self.setup.model.rules[state.rule.get().expect("open modules have a rule")];
         let known = state.open.as_ref().expect("open");
         let elsewhere = known.flow.is_none();
-        if rule.atoms.is_empty() || (known.clear || !elsewhere) && !known.at.contains(&Sign::Zero) {
+        let jumping: SmallVec<[usize; 4]> =
+            (0..rule.atoms.len()).filter(|atom| is_settled_behind(rule, *atom)).collect();
+        let is_known = (known.clear || !elsewhere) && !known.at.contains(&Sign::Zero) && jumping.is_empty();
+        if rule.atoms.is_empty() || is_known {
             return (Signs::from_slice(&known.at), false);
         }
         let mut entry = known.clone();
@@ -93,19 +96,19 @@ impl EventStage<'_, '_> {
                 rule.sides.eval(&moving, &mut scratch, &mut out);
             }
         }
-        self.settle_jumps(id, rule, &entry.at, &mut after);
+        self.settle_jumps(id, &jumping, &entry.at, &mut after);
         self.world.state_mut(id).expect("seen above").open = Some(entry);
         (after, snapped)
     }
 
-    /// Signs of differences that jump and were not taken apart, where only equations ask for them, are those a little after the instant: what
-    /// jumps in them meets its level at the instant, and on which side of the jump the numbers of now are is rounding.
-    fn settle_jumps(&mut self, id: ModuleId, rule: &Rule, at: &[Sign], after: &mut [Sign]) {
-        let is_settled = |atom: &usize| rule.jumping_whole[*atom] && !rule.decides_productions(*atom);
-        let jumping: SmallVec<[usize; 4]> = (0..rule.atoms.len()).filter(is_settled).collect();
+    /// Gives these atoms the signs a little after the instant: what jumps in them meets its level at the instant, and on which side of the jump
+    /// the numbers of now are is rounding.
+    fn settle_jumps(&mut self, id: ModuleId, jumping: &[usize], at: &[Sign], after: &mut [Sign]) {
         if jumping.is_empty() {
             return;
         }
+        let rule = self.world.state(id).and_then(|state| state.rule.get());
+        let rule = &self.setup.model.rules[rule.expect("open modules have a rule")];
         let reads: SmallVec<[usize; 8]> =
             jumping.iter().flat_map(|atom| rule.atom_reads[*atom].iter().copied()).collect();
         let meets = |atom: &usize| at[*atom] == Sign::Zero && !rule.jumping_whole[*atom];
@@ -115,7 +118,7 @@ impl EventStage<'_, '_> {
         self.flow().moving_variables(id, delay, &mut moving);
         let mut sides = vec![Dual { value: 0.0, rate: 0.0 }; rule.sides.outputs()];
         rule.sides.eval(&moving, &mut registers, &mut sides);
-        for atom in jumping {
+        for &atom in jumping {
             let [a, b] = [sides[2 * atom], sides[2 * atom + 1]];
             let sign = sign_at_birth(a.value, b.value);
             // So soon, a difference that moves may not have parted.
@@ -129,4 +132,9 @@ impl EventStage<'_, '_> {
     pub(super) fn scale(&self, id: ModuleId) -> f64 {
         self.world.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()))
     }
+}
+
+/// True for differences that jump and were not taken apart, where only equations ask for them; productions take place behind a jump.
+fn is_settled_behind(rule: &Rule, atom: usize) -> bool {
+    rule.jumping_whole[atom] && !rule.decides_productions(atom)
 }
