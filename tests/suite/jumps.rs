@@ -4,7 +4,6 @@
 use crate::common::{Plain, run};
 use crate::semantics::fails;
 use dlsys::sim::{Error, Method, Settings};
-use proptest::prelude::*;
 
 fn at(text: &str, t: f64) -> Vec<Plain> {
     run(text, Settings::default(), &[t]).unwrap_or_else(|e| panic!("{e}\n{text}")).remove(0)
@@ -448,40 +447,4 @@ fn jumps_of_a_neighbour_that_has_an_event_there_are_counted_once() {
     let whole = u.floor();
     // Once at the beginning, and at each whole number.
     assert_eq!(a.1[2..], [whole - 2.0 * (whole / 2.0).floor(), 1.0 + 2.0 - whole], "{string:?}");
-}
-
-/// The productions of `k*t - c - floor(k*t - c) < p & age > 0.4` up to a time; all but the rate k in units of 1/6000, so that all times are whole
-/// numbers.
-fn productions_in_periods(k: i64, c: i64, p: i64, end: i64) -> u32 {
-    const UNIT: i64 = 6000;
-    let (mut t, mut n) = (0, 0);
-    loop {
-        let ripe = t + 2 * UNIT / 5;
-        let place = (k * ripe - c).rem_euclid(UNIT);
-        t = if place < p { ripe } else { ripe + (UNIT - place) / k };
-        match t < end {
-            true => n += 1,
-            false => return n,
-        }
-    }
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
-    #[test]
-    fn a_place_within_a_period_is_reached_once_in_each(
-        k in 1..4i64, c in 1..100i64, p in 1..50i64, method in 0..3usize,
-        rate in prop::sample::select(vec!["x", "sin(t)", "floor(3*t)", "floor(2.3*t)", "if floor(1.7*t) > 1 then 1 else 2"]),
-    ) {
-        // Multiples of 60, so that all times are whole.
-        let n = productions_in_periods(k, 60 * c, 60 * p, 14_227);
-        let (c, p) = (c as f64 / 100.0, p as f64 / 100.0);
-        let text = format!(
-            "initial string: A(0.9, 0)\nA(x, n):\n  solve dx/dt = {rate}\n  if {k}*t - {c} - floor({k}*t - {c}) < {p} & age > 0.4 produce A(x, n + 1)"
-        );
-        let method = [Method::Auto, Method::Dopri5, Method::Radau][method];
-        let strings = run(&text, Settings { method, ..Settings::default() }, &[14_227.0 / 6000.0]);
-        let string = strings.unwrap_or_else(|error| panic!("{error}\n{text}")).remove(0);
-        prop_assert_eq!(string[0].1[1], f64::from(n), "{}", text);
-    }
 }

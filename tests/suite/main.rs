@@ -70,5 +70,6 @@ mod usd;
 mod usd_reader;
 mod verify;
 mod view;
+mod whole_parts;
 mod wild;
 mod wilting;

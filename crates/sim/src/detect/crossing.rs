@@ -263,9 +263,17 @@ impl CrossingDetector {
         // The sign with which a boundary was left prevails over values that are rounding, and over a jump within the
         // resolution of time.
         let (mut from, mut tolerance) = (from, tolerance);
-        let start = self.difference(path, atom).value(from);
-        if path.rule.jumping_whole[atom] && sign == Sign::Zero && start == 0.0 {
-            from = (from + self.blur(path, atom)).min(limit);
+        let mut start = self.difference(path, atom).value(from);
+        if path.rule.jumping_whole[atom] && sign != Sign::Any {
+            let behind = (from + self.blur(path, atom)).min(limit);
+            if sign == Sign::Zero && start == 0.0 {
+                from = behind;
+            } else if Sign::of(start) != sign {
+                let then = self.difference(path, atom).value(behind);
+                if Sign::of(then) == sign {
+                    (from, start) = (behind, then);
+                }
+            }
         }
         if sign != Sign::Any && start != 0.0 && start * sign_of(sign) <= 0.0 {
             let size = self.out[2 * atom].abs().max(1.0);

@@ -9,7 +9,7 @@ use super::{EventStage, Firing, chance};
 use crate::world::new_modules::NewModules;
 use dlsys_expr::Dual;
 use dlsys_model::{Sign, Truth};
-use dlsys_tree::Family;
+use dlsys_tree::{Family, ModuleId};
 
 /// The first delay that is tried, in resolutions of time.
 const FIRST_DELAY: f64 = 64.0;
@@ -106,12 +106,25 @@ impl EventStage<'_, '_> {
             Some(open) => (0..rule.atoms.len()).filter(|atom| open.at[*atom] == Sign::Zero).collect(),
             None => Vec::new(),
         };
+        let reads = &self.setup.jump_reads[fire.rule][fire.produce];
+        let delay = self.delay_of_parting(fire.id, reads, &zero);
+        let mut moving = Vec::new();
+        [1.0, 2.0].map(|times| {
+            self.flow().moving_variables(fire.id, times * delay, &mut moving);
+            moving.iter().map(|variable| variable.value).collect()
+        })
+    }
+    /// A time after the instant at which a module's sides that meet at it have parted again, and variables over which something jumps have moved
+    /// by more than their rounding.
+    pub(super) fn delay_of_parting(&mut self, id: ModuleId, reads: &[usize], zero: &[usize]) -> f64 {
+        let rule = self.world.state(id).and_then(|state| state.rule.get());
+        let rule = &self.setup.model.rules[rule.expect("open modules have a rule")];
         self.flows.known_rates.clear();
         let longest = LONGEST_DELAY * self.instant.at.to_f64().abs().max(1.0);
         let (mut moving, mut registers) = (Vec::new(), Vec::new());
-        self.flow().moving_variables(fire.id, 0.0, &mut moving);
+        self.flow().moving_variables(id, 0.0, &mut moving);
         let [mut least, mut most] = [FIRST_DELAY * self.instant.at.resolution(), longest];
-        for &variable in &self.setup.jump_reads[fire.rule][fire.produce] {
+        for &variable in reads {
             let Some(Dual { value, rate }) = moving.get(variable).filter(|moving| moving.rate != 0.0) else {
                 continue;
             };
@@ -121,20 +134,16 @@ impl EventStage<'_, '_> {
         let mut delay = least.min(most);
         let mut sides = vec![Dual { value: 0.0, rate: 0.0 }; rule.sides.outputs()];
         loop {
-            self.flow().moving_variables(fire.id, delay, &mut moving);
+            self.flow().moving_variables(id, delay, &mut moving);
             rule.sides.eval(&moving, &mut registers, &mut sides);
             let has_parted = |atom: &usize| {
                 let [a, b] = [sides[2 * atom], sides[2 * atom + 1]];
                 (a.value - b.value).abs() > CLEAR * a.value.abs().max(b.value.abs()) || a.rate == b.rate
             };
             if zero.iter().all(has_parted) || delay >= longest {
-                break;
+                return delay;
             }
             delay = (4.0 * delay).min(longest);
         }
-        [1.0, 2.0].map(|times| {
-            self.flow().moving_variables(fire.id, times * delay, &mut moving);
-            moving.iter().map(|variable| variable.value).collect()
-        })
     }
 }

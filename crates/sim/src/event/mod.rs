@@ -22,6 +22,7 @@ mod consistency;
 mod cut;
 pub mod derivation;
 mod exact;
+mod heading;
 mod iterate;
 mod lazy;
 mod levels;

@@ -11,10 +11,8 @@ use smallvec::SmallVec;
 use super::SHORT_LIFE;
 use super::opening::open;
 use super::{EventStage, Firing};
-use crate::detect::signs::{NEAR, opposite};
 use crate::error::Error;
 use crate::world::state::{Open, Signs, Switches};
-use dlsys_expr::Dual;
 use dlsys_model::{Condition, ConditionStep, Remedy, Rule, Sign, Truth, ZeroCrossing};
 use dlsys_tree::ModuleId;
 
@@ -22,13 +20,10 @@ use dlsys_tree::ModuleId;
 const MAX_PASSES: usize = 8;
 
 /// So far away what a module reads may have got other equations for its signs to be in question.
-const FAR_AWAY: usize = 4;
+pub(super) const FAR_AWAY: usize = 4;
 
 /// So many times the conditions inside the equations of a module turn before it is tried on the boundary.
 const FLIPS: usize = 2;
-
-/// A rate of no more than this part of the value, over the length of a step, is rounding.
-const NOISE: f64 = 16.0 * f64::EPSILON;
 
 /// Rates that differ by no more than this part of them, or of the module's parameters over a step, are the same.
 const SMOOTH: f64 = 1e-9;
@@ -282,7 +277,7 @@ impl EventStage<'_, '_> {
     }
 
     /// True if a module, and those that it reads, go on with the equations that brought them here.
-    fn goes_on_alike(&self, id: ModuleId, depth: usize) -> bool {
+    pub(super) fn goes_on_alike(&self, id: ModuleId, depth: usize) -> bool {
         let is_new = || self.instant.at.since(self.world.tree.birth(id)) <= 0.0;
         let Some(state) = self.world.state(id) else { return !is_new() };
         let is_other = |open: &Open| {
@@ -321,101 +316,6 @@ impl EventStage<'_, '_> {
         };
         let size = self.scale(id) / self.flows.reach_of(self.world, id);
         here.iter().zip(&there).all(|(a, b)| (a - b).abs() <= smooth * (size + a.abs().max(b.abs())))
-    }
-
-    /// Where a module's signs go under the present equations. Also tells whether a sign turned out to be
-    /// zero within the resolution of time.
-    pub(super) fn signs_after(&mut self, id: ModuleId) -> (Signs, bool) {
-        let state = self.world.state(id).expect("open modules have a state");
-        let rule = &self.setup.model.rules[state.rule.get().expect("open modules have a rule")];
-        let known = state.open.as_ref().expect("open");
-        let elsewhere = known.flow.is_none();
-        if rule.atoms.is_empty() || (known.clear || !elsewhere) && !known.at.contains(&Sign::Zero) {
-            return (known.at.clone(), false);
-        }
-        let mut entry = known.clone();
-        let mut snapped = false;
-        let mut after = entry.at.clone();
-        let mut moving = Vec::new();
-        self.flow().moving_variables(id, 0.0, &mut moving);
-        let mut scratch = Vec::new();
-        let mut out = vec![Dual { value: 0.0, rate: 0.0 }; rule.sides.outputs()];
-        rule.sides.eval(&moving, &mut scratch, &mut out);
-        let mut probed = false;
-        let reach = self.flows.reach_of(self.world, id).clamp(f64::MIN_POSITIVE, 1e300);
-        for atom in 0..rule.atoms.len() {
-            let (a, b) = (out[2 * atom], out[2 * atom + 1]);
-            let slope = a.rate - b.rate;
-            let size = a.value.abs().max(b.value.abs());
-            if elsewhere && matches!(entry.at[atom], Sign::Plus | Sign::Minus) {
-                let gap = (a.value - b.value).abs();
-                if gap <= slope.abs() * self.instant.at.resolution() && gap <= NEAR * self.scale(id) {
-                    entry.at[atom] = Sign::Zero;
-                    snapped = true;
-                }
-            }
-            if entry.at[atom] != Sign::Zero {
-                continue;
-            }
-            let clear = |slope: f64, least: f64| {
-                if slope.abs() * reach > least * size { Sign::of(slope) } else { Sign::Zero }
-            };
-            after[atom] = match (clear(slope, 1e-9), entry.guess[atom]) {
-                (Sign::Zero, guess @ (Sign::Plus | Sign::Minus))
-                    if !elsewhere && self.goes_on_alike(id, FAR_AWAY) =>
-                {
-                    guess
-                }
-                (Sign::Zero, _) => match clear(slope, NOISE) {
-                    Sign::Zero => {
-                        probed = true;
-                        // Not moving yet, or at rest: look ahead, first a little, then further.
-                        let mut ahead = |part: f64| {
-                            self.flow().moving_variables(id, part * reach.min(1e12), &mut moving);
-                            rule.sides.eval(&moving, &mut scratch, &mut out);
-                            [out[2 * atom], out[2 * atom + 1]]
-                        };
-                        let moves = [1e-9, 1e-6, 1e-3].into_iter().find_map(|part| {
-                            let [a, b] = ahead(part);
-                            Some(clear(a.rate - b.rate, 1e-12)).filter(|sign| *sign != Sign::Zero)
-                        });
-                        match moves {
-                            Some(sign) => sign,
-                            // What has jumped is there at once; productions take place behind a jump.
-                            None if rule.jumping_whole[atom] && !rule.decides_productions(atom) => {
-                                let [a, b] = ahead(1e-9);
-                                Sign::of(a.value - b.value)
-                            }
-                            None => Sign::Zero,
-                        }
-                    }
-                    sign => sign,
-                },
-                // It turns back at a kink (`abs(x)` at 0), and the numbers of now are a rounding before it: a little later tells.
-                (sign @ (Sign::Plus | Sign::Minus), guess) if guess == opposite(sign) => {
-                    probed = true;
-                    self.flow().moving_variables(id, 1e-9 * reach.min(1e12), &mut moving);
-                    rule.sides.eval(&moving, &mut scratch, &mut out);
-                    let [later_a, later_b] = [out[2 * atom], out[2 * atom + 1]];
-                    let turns = Sign::of(later_a.value - later_b.value) == guess
-                        && clear(later_a.rate - later_b.rate, 1e-9) == guess;
-                    if turns { guess } else { sign }
-                }
-                (sign, _) => sign,
-            };
-            if std::mem::take(&mut probed) {
-                // The probes have written over it.
-                self.flow().moving_variables(id, 0.0, &mut moving);
-                rule.sides.eval(&moving, &mut scratch, &mut out);
-            }
-        }
-        self.world.state_mut(id).expect("seen above").open = Some(entry);
-        (after, snapped)
-    }
-
-    /// The size of a module's parameters, against which a tiny one is as good as zero.
-    fn scale(&self, id: ModuleId) -> f64 {
-        self.world.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()))
     }
 
     fn no_equations(&mut self, missing: &NoMode) -> Error {

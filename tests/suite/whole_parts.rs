@@ -1,0 +1,103 @@
+//! Random conditions on whole parts, in rates, clauses and productions: places within a period, remainders, multiples. Each against what is
+//! counted or added up by hand.
+
+use dlsys::sim::{Method, Settings};
+use proptest::prelude::*;
+
+use crate::common::run;
+
+/// The productions of `k*t - c - floor(k*t - c) < p & age > 0.4` up to a time; all but the rate k in units of 1/6000, so that all times are whole
+/// numbers.
+fn productions_in_periods(k: i64, c: i64, p: i64, end: i64) -> u32 {
+    const UNIT: i64 = 6000;
+    let (mut t, mut n) = (0, 0);
+    loop {
+        let ripe = t + 2 * UNIT / 5;
+        let place = (k * ripe - c).rem_euclid(UNIT);
+        t = if place < p { ripe } else { ripe + (UNIT - place) / k };
+        match t < end {
+            true => n += 1,
+            false => return n,
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn a_place_within_a_period_is_reached_once_in_each(
+        k in 1..4i64, c in 1..100i64, p in 1..50i64, method in 0..3usize,
+        rate in prop::sample::select(vec!["x", "sin(t)", "floor(3*t)", "floor(2.3*t)", "if floor(1.7*t) > 1 then 1 else 2"]),
+    ) {
+        // Multiples of 60, so that all times are whole.
+        let n = productions_in_periods(k, 60 * c, 60 * p, 14_227);
+        let (c, p) = (c as f64 / 100.0, p as f64 / 100.0);
+        let text = format!(
+            "initial string: A(0.9, 0)\nA(x, n):\n  solve dx/dt = {rate}\n  if {k}*t - {c} - floor({k}*t - {c}) < {p} & age > 0.4 produce A(x, n + 1)"
+        );
+        let method = [Method::Auto, Method::Dopri5, Method::Radau][method];
+        let strings = run(&text, Settings { method, ..Settings::default() }, &[14_227.0 / 6000.0]);
+        let string = strings.unwrap_or_else(|error| panic!("{error}\n{text}")).remove(0);
+        prop_assert_eq!(string[0].1[1], f64::from(n), "{}", text);
+    }
+}
+
+/// Rates that depend on the whole part f of y, as they are written and as numbers.
+const OF_WHOLE_PARTS: [(&str, fn(f64) -> f64); 9] = [
+    ("if floor(y) - 2*floor(y/2) = 0 then 2 else 1", |f| 2.0 - f.rem_euclid(2.0)),
+    ("if floor(y) > 2*floor(y/2) then 1 else 2", |f| 2.0 - f.rem_euclid(2.0)),
+    ("match floor(y) - 4*floor(y/4) case 0: 2 case 1: 1.5 case 2: 0.3 else 1", |f| {
+        [2.0, 1.5, 0.3, 1.0][f.rem_euclid(4.0) as usize]
+    }),
+    ("match 2*floor(y) case 2: 2 case 0: 1.5 else 0.5", |f| match f {
+        1.0 => 2.0,
+        0.0 => 1.5,
+        _ => 0.5,
+    }),
+    ("if 2*floor(y) = 2 then 2 else 0.5", |f| if f == 1.0 { 2.0 } else { 0.5 }),
+    ("if floor(y)^2 = 1 then 2 else 0.5", |f| if f.abs() == 1.0 { 2.0 } else { 0.5 }),
+    ("if floor(y)/2 = 1 then 2 else 0.5", |f| if f == 2.0 { 2.0 } else { 0.5 }),
+    ("if floor(y) + 1 > y + 0.3 then 1 else 1", |_| 1.0),
+    ("if sign(y - floor(y) - 2) = 0 then 9 else floor(y)/8", |f| f / 8.0),
+];
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn rates_by_whole_parts_of_what_is_integrated_are_those_of_the_present_part(
+        which in 0..OF_WHOLE_PARTS.len(), start in -4.0..4.0f64, method in 0..3usize, as_clauses in prop::bool::ANY,
+        speed in prop_oneof![-1.3..-0.4f64, 0.4..1.3f64],
+    ) {
+        let (rate, of) = OF_WHOLE_PARTS[which];
+        // y = sinh(asinh(start) + speed t): there is no formula for it in the program.
+        let y = |t: f64| (start.asinh() + speed * t).sinh();
+        let end = 3.0;
+        let (low, high) = (y(0.0).min(y(end)).ceil() as i32, y(0.0).max(y(end)).floor() as i32);
+        let mut times: Vec<f64> = (low..=high).map(|whole| (f64::from(whole).asinh() - start.asinh()) / speed).collect();
+        times.extend([0.0, end]);
+        times.sort_by(f64::total_cmp);
+        let expected: f64 = times.windows(2).map(|t| (t[1] - t[0]) * of(y(0.5 * (t[0] + t[1])).floor())).sum();
+        let flow = format!("dy/dt = {speed:?}*sqrt(1 + y^2)");
+        let body = if as_clauses && which == 0 {
+            format!("\n  if floor(y) - 2*floor(y/2) = 0 solve dx/dt = 2, {flow}\n  if floor(y) - 2*floor(y/2) = 1 solve dx/dt = 1, {flow}")
+        } else {
+            format!(" solve dx/dt = {rate}, {flow}")
+        };
+        let text = format!("initial string: A(0, {start:?})\nA(x, y):{body}");
+        let method = [Method::Auto, Method::Dopri5, Method::Radau][method];
+        let strings = run(&text, Settings { method, ..Settings::default() }, &[end]);
+        let string = strings.unwrap_or_else(|error| panic!("{method:?}: {error}\n{text}")).remove(0);
+        let found = string[0].1[0];
+        prop_assert!((found - expected).abs() < 1e-4 * expected.abs().max(1.0), "{:?}: {}, not {}\n{}", method, found, expected, text);
+    }
+}
+
+#[test]
+fn a_sign_that_is_zero_at_an_instant_holds_nothing_up() {
+    let text = "initial string: A(0, 2.295, 2.286)\nA(x, y, z):\n  solve dx/dt = if 2*sign(y - z) = 0 then 2 else 0.5, dy/dt = 0.532*(-1.064 - y), dz/dt = -1.5";
+    for method in [Method::Auto, Method::Dopri5, Method::Radau] {
+        let strings = run(text, Settings { method, ..Settings::default() }, &[3.0]);
+        let x = strings.unwrap_or_else(|error| panic!("{method:?}: {error}"))[0][0].1[0];
+        assert!((x - 1.5).abs() < 1e-5, "{method:?}: {x}");
+    }
+}
