@@ -17,6 +17,9 @@
 
 #![warn(missing_docs)]
 
+// The parser that pest derives without `std` names it.
+extern crate alloc;
+
 pub mod ast;
 pub mod declarations;
 mod error;
