@@ -327,30 +327,54 @@ impl Canvas<'_> {
     }
 }
 
+/// Pixels of which it is told at once whether all of them are empty, as most of a picture is.
+const BLOCK: usize = 16;
+
 /// The bytes of one image that fills a page; a sky stands behind it where there is a background.
 fn composed(page: &Page, sky: Option<&Sky>, image: &Image) -> Vec<u8> {
-    let mut data = Vec::with_capacity(image.pixels.len() * if page.background.is_some() { 3 } else { 4 });
+    let Some(color) = page.background else { return uncovered(image) };
+    let mut data = Vec::with_capacity(3 * image.pixels.len());
+    let mut empty: Vec<u8> = Vec::new();
     for (line, row) in image.pixels.chunks_exact(image.width.max(1)).enumerate() {
         let part = (line as f64 + 0.5) / image.height.max(1) as f64;
-        let background = page.background.map(|color| sky.map_or(color, |sky| sky.color(part)));
-        let background = background.map(|color| [color.red, color.green, color.blue]);
-        for &[red, green, blue, opacity] in row {
-            let (color, open) = ([red, green, blue], u32::from(255 - opacity));
-            match background {
-                Some(_) if open == 0 => data.extend(color),
-                Some(background) if open == 255 => data.extend(background),
-                Some(background) => data.extend([0, 1, 2].map(|k| {
-                    let behind = (u32::from(background[k]) * open + 127) / 255;
-                    (u32::from(color[k]) + behind).min(255) as u8
-                })),
-                None if open == 0 => data.extend([red, green, blue, 255]),
-                None => {
-                    let whole = u32::from(opacity.max(1));
-                    data.extend(color.map(|c| ((u32::from(c) * 255 + whole / 2) / whole).min(255) as u8));
-                    data.push(opacity);
-                }
+        let background = sky.map_or(color, |sky| sky.color(part));
+        let background = [background.red, background.green, background.blue];
+        let start = data.len();
+        if sky.is_some() || line == 0 {
+            empty.clear();
+            (0..row.len()).for_each(|_| empty.extend(background));
+        }
+        data.extend_from_slice(&empty);
+        let over = data[start..].as_chunks_mut::<3>().0.chunks_mut(BLOCK);
+        for (pixels, over) in row.chunks(BLOCK).zip(over) {
+            let all = pixels.iter().fold(0, |all, pixel| all | u32::from_ne_bytes(*pixel));
+            if all == 0 {
+                continue;
+            }
+            for (&[red, green, blue, opacity], over) in pixels.iter().zip(over) {
+                let (color, open) = ([red, green, blue], u32::from(255 - opacity));
+                *over = match open {
+                    0 => color,
+                    255 => background,
+                    _ => [0, 1, 2].map(|k| {
+                        let behind = (u32::from(background[k]) * open + 127) / 255;
+                        (u32::from(color[k]) + behind).min(255) as u8
+                    }),
+                };
             }
         }
+    }
+    data
+}
+
+/// The bytes of an image without a background: colours, and opacities.
+fn uncovered(image: &Image) -> Vec<u8> {
+    let mut data = Vec::with_capacity(4 * image.pixels.len());
+    for &[red, green, blue, opacity] in &image.pixels {
+        let whole = u32::from(opacity.max(1));
+        let color = [red, green, blue];
+        data.extend(color.map(|c| ((u32::from(c) * 255 + whole / 2) / whole).min(255) as u8));
+        data.push(opacity);
     }
     data
 }

@@ -12,7 +12,10 @@
 mod band;
 pub(super) mod cells;
 mod fragments;
+mod lanes;
+mod list;
 mod plane;
+mod resolve;
 pub(super) mod samples;
 
 use std::ops::Range;
@@ -20,6 +23,7 @@ use std::sync::{Mutex, PoisonError};
 
 use super::mapping::Cut;
 use band::Band;
+use list::List;
 
 /// Rows in a band.
 pub(super) const BAND: usize = 16;
@@ -129,23 +133,27 @@ pub(super) fn draw<const N: usize>(
     pixels: &mut [[u8; 4]],
 ) {
     // Triangles that each band may show, in order.
-    let mut bands: Vec<Vec<u32>> = vec![Vec::new(); rows.len().div_ceil(BAND)];
+    let mut bands: Vec<List> = Vec::new();
+    bands.resize_with(rows.len().div_ceil(BAND), List::default);
     for number in 0..triangles.count() {
-        let of_picture = rows_of(triangles, number, rows.end.min(height));
+        let corners = triangles.corners(number);
+        let of_picture = range(corners.map(|corner| i64::from(corner.y)), rows.end.min(height));
         if let Some([first, last]) = of_picture.filter(|[_, last]| *last >= rows.start) {
             let [first, last] = [first, last].map(|row| row.saturating_sub(rows.start) / BAND);
             let last = last.min(bands.len().saturating_sub(1));
-            bands[first..=last].iter_mut().for_each(|band| band.push(number as u32));
+            let nearest = corners.iter().fold(f32::MIN, |nearest, corner| nearest.max(corner.depth));
+            let surface = triangles.surface(number);
+            bands[first..=last].iter_mut().for_each(|band| band.push(number as u32, surface, nearest));
         }
     }
     let work = Mutex::new(pixels.chunks_mut((BAND * width).max(1)).zip(&bands).enumerate());
     let draw_bands = || {
         let mut band = Band::new(pattern, width);
         let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
-        while let Some((index, (pixels, numbers))) = next() {
+        while let Some((index, (pixels, list))) = next() {
             let top = rows.start + index * BAND;
-            band.draw(triangles, numbers, top..(top + BAND).min(rows.end));
-            band.resolve(triangles, numbers, top, pixels);
+            band.draw(triangles, list, top..(top + BAND).min(rows.end));
+            band.resolve(triangles, list, top, pixels);
         }
     };
     std::thread::scope(|scope| {

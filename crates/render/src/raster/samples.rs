@@ -1,5 +1,8 @@
 //! Which triangle is the nearest at several samples of some pixels: those in which edges are.
 
+use wide::bytemuck::cast;
+use wide::{f32x4, i32x4};
+
 use super::band::left_of;
 use super::cells::{Given, Nearest};
 use super::fragments::{self, Cover, Places};
@@ -11,6 +14,8 @@ use crate::mapping::Cut;
 pub(crate) const EIGHT: Pattern<8> = [(1, -3), (-1, 3), (5, 1), (-3, -5), (-5, 5), (-7, -1), (3, 7), (7, -7)];
 /// Pixels along a side of a block.
 const BLOCK: usize = 8;
+/// The first four bits.
+const BITS: i32x4 = i32x4::new([1, 2, 4, 8]);
 /// The first column of a block.
 const COLUMN: u64 = 0x0101_0101_0101_0101;
 
@@ -178,15 +183,19 @@ impl<const N: usize> Nearest<N> {
         }
         let plane = &drawn.ready.plane;
         let base = plane.at(pixel);
-        let (numbers, depths) = (&mut self.numbers[place], &mut self.depths[place]);
-        // Without branches, so that the compiler works on several samples at a time.
-        for s in 0..N {
-            let depth = plane.sample(base, [xs[s], ys[s]]);
-            let least = if drawn.number > numbers[s] { depth + EQUAL } else { depth - EQUAL };
-            let is_nearer = mask >> s & 1 == 1 && least >= depths[s];
-            let nearest = if depth > depths[s] { depth } else { depths[s] };
-            depths[s] = if is_nearer { nearest } else { depths[s] };
-            numbers[s] = if is_nearer { drawn.number } else { numbers[s] };
+        let numbers = self.numbers[place].as_chunks_mut::<4>().0;
+        let depths = self.depths[place].as_chunks_mut::<4>().0;
+        let [xs, ys] = [xs, ys].map(|at| at.as_chunks::<4>().0);
+        let (number, equal) = (i32x4::splat(drawn.number as i32), f32x4::splat(EQUAL));
+        for k in 0..N / 4 {
+            let (held, far) = (cast::<[u32; 4], i32x4>(numbers[k]), f32x4::new(depths[k]));
+            let depth = plane.samples(base, [f32x4::new(xs[k]), f32x4::new(ys[k])]);
+            let is_later: f32x4 = cast(number.simd_gt(held));
+            let least = is_later.select(depth + equal, depth - equal);
+            let is_covered = (i32x4::splat((mask >> (4 * k)) as i32) & BITS).simd_eq(BITS);
+            let is_nearer = is_covered & cast::<f32x4, i32x4>(least.simd_ge(far));
+            numbers[k] = cast(is_nearer.select(number, held));
+            depths[k] = cast(cast::<i32x4, f32x4>(is_nearer).select(depth.fast_max(far), far));
         }
     }
 }
