@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::{Content, Description, Drawing, Exporter};
+use super::{Content, Description, Drawing, Exporter, rows};
 use crate::lens::Lens;
 use crate::light::Spot;
 use crate::lighting::Lighting;
@@ -157,8 +157,10 @@ impl<'m> Lit<'m> {
     }
 
     /// The corners of a triangle on the grid of the rasteriser, once the origin stays.
+    #[inline(always)]
     pub(crate) fn snapped(&self, n: usize) -> [Place; 3] {
-        self.mesh.faces[n].corners.map(|(vertex, _)| self.snapped[vertex as usize])
+        let [(p, _), (q, _), (r, _)] = self.mesh.faces[n].corners;
+        [self.snapped[p as usize], self.snapped[q as usize], self.snapped[r as usize]]
     }
 
     /// The corners of a triangle.
@@ -386,12 +388,13 @@ pub(crate) fn file(page: &Page, title: &str, data: &[u8]) -> Vec<u8> {
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(if page.background.is_some() { png::ColorType::Rgb } else { png::ColorType::Rgba });
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Fast);
     // PNG's own texts are of another alphabet.
     let _ = encoder.add_itxt_chunk("Title".to_owned(), title.to_owned());
     // Writing to memory does not fail, and the sizes are right.
+    let pixel = if page.background.is_some() { 3 } else { 4 };
+    let rows = rows::compressed(data, width as usize * pixel, pixel);
     let written = encoder.write_header().and_then(|mut writer| {
-        writer.write_image_data(data)?;
+        writer.write_chunk(png::chunk::IDAT, &rows?)?;
         writer.finish()
     });
     debug_assert!(written.is_ok(), "{written:?}");

@@ -150,8 +150,8 @@ impl<const N: usize> Band<N> {
                         continue;
                     }
                     let mut at = here;
-                    for side in 0..3 {
-                        at[side] += ready.sides[side][1] * (STEPS * k as i64);
+                    for (at, [_, a, _]) in at.iter_mut().zip(ready.sides) {
+                        *at += a * (STEPS * k as i64);
                     }
                     let cover = match &mut cover {
                         Some(cover) => cover,
@@ -166,13 +166,13 @@ impl<const N: usize> Band<N> {
                         self.share(line + column, Fragment { mask, ..new }, [column, row]);
                     }
                 }
-                for side in 0..3 {
-                    here[side] += ready.sides[side][1] * (STEPS * LANES as i64);
+                for (here, [_, a, _]) in here.iter_mut().zip(ready.sides) {
+                    *here += a * (STEPS * LANES as i64);
                 }
                 first += LANES;
             }
-            for side in 0..3 {
-                start[side] += ready.sides[side][2] * STEPS;
+            for (start, [.., b]) in start.iter_mut().zip(ready.sides) {
+                *start += b * STEPS;
             }
         }
     }

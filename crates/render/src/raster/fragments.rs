@@ -192,30 +192,41 @@ impl<const N: usize> Fragments<N> {
     ) -> [u8; 4] {
         let (mut sum, mut left) = ([0_u32; 4], N as u32);
         let count = self.count as usize;
-        let surfaces: [u32; N] = {
-            let mut surfaces = [0; N];
-            (0..count).for_each(|i| surfaces[i] = surface(self.places[i]));
-            surfaces
-        };
+        let mut surfaces = [0; N];
+        for (own, place) in surfaces.iter_mut().zip(&self.places[..count]) {
+            *own = surface(*place);
+        }
+        let mut is_done = 0_u32;
         for i in 0..count {
-            if surfaces[..i].contains(&surfaces[i]) {
+            if is_done >> i & 1 == 1 {
                 continue;
             }
-            let same = (i..count).filter(|&k| surfaces[k] == surfaces[i]);
-            let (mut first, mut mask) = (i, 0);
-            for k in same {
-                if self.masks[k].trailing_zeros() < self.masks[first].trailing_zeros() {
-                    first = k;
+            let (mut first, mut mask) = (self.places[i], self.masks[i]);
+            for k in i + 1..count {
+                if surfaces[k] == surfaces[i] {
+                    is_done |= 1 << k;
+                    let other = self.masks[k];
+                    // No two have a sample in common.
+                    if other & other.wrapping_neg() < mask & mask.wrapping_neg() {
+                        first = self.places[k];
+                    }
+                    mask |= other;
                 }
-                mask |= self.masks[k];
             }
-            let painted = color(self.places[first]);
+            let painted = color(first);
             let weight = mask.count_ones();
+            if weight == N as u32 {
+                return painted;
+            }
             left -= weight;
-            sum.iter_mut().zip(painted).for_each(|(sum, channel)| *sum += weight * u32::from(channel));
+            for (sum, channel) in sum.iter_mut().zip(painted) {
+                *sum += weight * u32::from(channel);
+            }
         }
         if left > 0 {
-            sum.iter_mut().zip(open()).for_each(|(sum, channel)| *sum += left * u32::from(channel));
+            for (sum, channel) in sum.iter_mut().zip(open()) {
+                *sum += left * u32::from(channel);
+            }
         }
         sum.map(|total| ((total + N as u32 / 2) / N as u32) as u8)
     }

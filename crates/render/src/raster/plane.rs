@@ -31,7 +31,8 @@ impl Plane {
     /// That of eight pixels of a row, from one on.
     #[inline(always)]
     pub(super) fn along_row(&self, [column, row]: [usize; 2]) -> f32x8 {
-        let right = f32x8::splat(column as f32 - self.column) + f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+        let right =
+            f32x8::splat(column as f32 - self.column) + f32x8::new([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
         let down = self.down * (row as f32 - self.row);
         f32x8::splat(self.depth) + f32x8::splat(self.right) * right + f32x8::splat(down)
     }
@@ -102,29 +103,29 @@ impl Ready {
     /// `None` if no sample of these rows can be in it.
     #[inline(always)]
     pub(super) fn new(corners: [Place; 3], width: usize, band: &Range<usize>) -> Option<Ready> {
-        let triangle = Oriented::new(
-            corners.map(|corner| [i64::from(corner.x), i64::from(corner.y)]),
-            corners.map(|corner| f64::from(corner.depth)),
-        )?;
-        let Oriented { at, depths, area } = triangle;
-        let columns = range(at.map(|p| p[0]), width)?;
-        let [first, last] = range(at.map(|p| p[1]), band.end)?;
+        let [p, q, r] = corners;
+        let columns = range([p.x, q.x, r.x], width)?;
+        let [first, last] = range([p.y, q.y, r.y], band.end)?;
         let rows = [first.max(band.start), last];
         if rows[0] > rows[1] {
             return None;
         }
+        let Oriented { at, depths, area } = Oriented::new(corners)?;
         let (x, y) = (columns[0] as i64 * STEPS, rows[0] as i64 * STEPS);
         // Places on a side belong to one of the two triangles that meet there.
-        let lines = triangle
-            .sides()
-            .map(|Side { a, b, through: [px, py], bias }| [a * (x - px) + b * (y - py) + bias, a, b]);
+        let side = |from: [i64; 2], to: [i64; 2]| {
+            let Side { a, b, bias } = Side::new(from, to);
+            [a * (x - from[0]) + b * (y - from[1]) + bias, a, b]
+        };
+        let lines = [side(at[1], at[2]), side(at[2], at[0]), side(at[0], at[1])];
         let scale = STEPS as f64 / area;
-        let slope = |i: usize| (0..3).map(|k| lines[k][i] as f64 * depths[k]).sum::<f64>() * scale;
-        let (right, down) = (slope(1), slope(2));
+        let [zp, zq, zr] = depths;
+        let slope = |p: i64, q: i64, r: i64| (p as f64 * zp + q as f64 * zq + r as f64 * zr) * scale;
+        let right = slope(lines[0][1], lines[1][1], lines[2][1]);
+        let down = slope(lines[0][2], lines[1][2], lines[2][2]);
         let steps = STEPS as f64;
-        let depth =
-            depths[0] + right * ((x - at[0][0]) as f64 / steps) + down * ((y - at[0][1]) as f64 / steps);
-        let [least, greatest] = triangle.reach();
+        let depth = zp + right * ((x - at[0][0]) as f64 / steps) + down * ((y - at[0][1]) as f64 / steps);
+        let [least, greatest] = [zp.min(zq).min(zr), zp.max(zq).max(zr)];
         let plane = Plane {
             column: columns[0] as f32,
             row: rows[0] as f32,
