@@ -132,10 +132,12 @@ impl<const N: usize> Band<N> {
                     break;
                 }
                 is_entered |= touched != 0;
+                let along = lanes.along([first, row]);
                 let mut open = match touched {
                     0 => 0,
-                    touched => touched & lanes.in_front([first, row], self.farthest(line + first)),
+                    touched => touched & lanes.in_front(along, self.farthest(line + first)),
                 };
+                let along = along.to_array();
                 while open != 0 {
                     let k = open.trailing_zeros() as usize;
                     open &= open - 1;
@@ -144,7 +146,7 @@ impl<const N: usize> Band<N> {
                     if drawn == Drawn::Nothing {
                         continue;
                     }
-                    let (far, near) = lanes.depths([column, row]);
+                    let (far, near) = lanes.depths(along[k]);
                     let new = Fragment { place, mask: 0, far, near };
                     if is_full && drawn == Drawn::All && self.covers(line + column, &new) {
                         continue;

@@ -15,6 +15,9 @@ const LANES: usize = 4;
 const BLOCK: usize = 64;
 /// The largest side of a small triangle, in steps.
 const SMALL: i64 = 24 * STEPS;
+/// The odd ones of four pixels, and the last two.
+const ONES: i32x4 = i32x4::new([0, -1, 0, -1]);
+const TWOS: i32x4 = i32x4::new([0, 0, -1, -1]);
 /// Half a pixel.
 const HALF: i64 = STEPS / 2;
 
@@ -97,7 +100,8 @@ impl Nearest<1> {
         let each = |[value, a, b]: [i64; 3]| {
             let value = (value + a * ahead[0] + b * ahead[1]) as i32;
             let right = (a * STEPS) as i32;
-            i32x4::new([value, value + right, value + 2 * right, value + 3 * right])
+            // Numbers that are stored one by one and loaded together would be waited for.
+            i32x4::splat(value) + (i32x4::splat(right) & ONES) + (i32x4::splat(2 * right) & TWOS)
         };
         let mut start = ready.sides.map(each);
         let further = ready.sides.map(|[_, a, _]| i32x4::splat((a * STEPS) as i32 * LANES as i32));

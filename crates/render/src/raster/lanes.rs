@@ -30,8 +30,7 @@ impl Lanes {
         let is_short = sides.iter().all(|[_, a, b]| a.abs() < SHORTEST && b.abs() < SHORTEST);
         let most = |[_, a, b]: [i64; 3]| {
             let (first, right) = (((a.max(0) + b.max(0)) * STEPS) as i32, (a * STEPS) as i32);
-            let along = |k: i32| first + right * k;
-            i32x8::new([0, 1, 2, 3, 4, 5, 6, 7].map(along))
+            i32x8::splat(first) + multiples(right)
         };
         let less = |[_, a, b]: [i64; 3]| i32x8::splat(((a.abs() + b.abs()) * STEPS) as i32);
         Lanes {
@@ -75,20 +74,34 @@ impl Lanes {
         [touched, full]
     }
 
-    /// The pixels, as bits, of which something is not behind what is the farthest there; given are the first one and these depths.
+    /// The depths at the upper left corners of the pixels, given the first one.
     #[inline(always)]
-    pub(super) fn in_front(&self, pixel: [usize; 2], far: [f32; LANES]) -> u32 {
-        let near = self.plane.bounded_all(self.plane.along_row(pixel) + f32x8::splat(self.reach[1]));
-        not_behind(near, far)
+    pub(super) fn along(&self, pixel: [usize; 2]) -> f32x8 {
+        self.plane.along_row(pixel)
     }
 
-    /// The least and the greatest depth in a pixel.
+    /// The pixels, as bits, of which something is not behind what is the farthest there; given are these depths.
     #[inline(always)]
-    pub(super) fn depths(&self, pixel: [usize; 2]) -> (f32, f32) {
-        let base = self.plane.at(pixel);
+    pub(super) fn in_front(&self, along: f32x8, far: [f32; LANES]) -> u32 {
+        not_behind(self.plane.bounded_all(along + f32x8::splat(self.reach[1])), far)
+    }
+
+    /// The least and the greatest depth in a pixel, given that at its upper left corner.
+    #[inline(always)]
+    pub(super) fn depths(&self, base: f32) -> (f32, f32) {
         let [lowest, highest] = self.reach;
         (self.plane.bounded(base + lowest), self.plane.bounded(base + highest))
     }
+}
+
+/// A number times 0, 1, 2 and so on. Numbers that are stored one by one and loaded together would be waited for.
+#[inline(always)]
+fn multiples(number: i32) -> i32x8 {
+    const ONES: i32x8 = i32x8::new([0, -1, 0, -1, 0, -1, 0, -1]);
+    const TWOS: i32x8 = i32x8::new([0, 0, -1, -1, 0, 0, -1, -1]);
+    const FOURS: i32x8 = i32x8::new([0, 0, 0, 0, -1, -1, -1, -1]);
+    let [one, two, four] = [1, 2, 4].map(|times| i32x8::splat(number * times));
+    (one & ONES) + (two & TWOS) + (four & FOURS)
 }
 
 /// All pixels.
