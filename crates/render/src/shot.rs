@@ -344,8 +344,10 @@ impl raster::Triangles for Shot<'_> {
         self.faces.len()
     }
 
+    #[inline(always)]
     fn corners(&self, n: usize) -> [Place; 3] {
-        self.faces[n].corners.map(|corner| self.places[corner as usize])
+        let [p, q, r] = self.faces[n].corners;
+        [self.places[p as usize], self.places[q as usize], self.places[r as usize]]
     }
 
     fn surface(&self, n: usize) -> u32 {

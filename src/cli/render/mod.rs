@@ -45,8 +45,17 @@ pub fn render(args: &RenderArgs) -> Result<(), Failure> {
     if args.watch { watch::watch(args) } else { once(args, &|| false) }
 }
 
+/// Makes the allocator keep the memory of a frame for the next one. That of GNU gives a block above a certain size back to the system as soon as it is
+/// free, and the system hands out the next one page by page, which takes as long as to draw into it. That size follows the largest block that was given back,
+/// up to this one. To other allocators it is nothing.
+fn keep_memory() {
+    const LARGEST: usize = (32 << 20) - (64 << 10);
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGEST)));
+}
+
 /// Renders, unless `stale` becomes true before anything is written.
 fn once(args: &RenderArgs, stale: &(dyn Fn() -> bool + Sync)) -> Result<(), Failure> {
+    keep_memory();
     let format = match args.format {
         RenderFormat::Frames(format) => format,
         RenderFormat::Growth(format) => return export::render(args, format, stale),

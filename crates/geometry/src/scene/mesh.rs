@@ -158,14 +158,29 @@ impl Mesh {
     /// Where a normal does not agree with a triangle at its vertex, as on a fold, the mean of the triangles
     /// there takes its place. `first` is the first vertex to look at.
     pub(super) fn orient(&mut self, first: u32) {
+        let area = |face: &Face| {
+            let [p, q, r] = face.corners;
+            let [p, q, r] = [self.vertices[p as usize], self.vertices[q as usize], self.vertices[r as usize]];
+            (q - p).cross(&(r - p))
+        };
+        let is_wrong = |area: &Vector, corner: u32| area.dot(&self.normals[corner as usize]) <= 0.0;
+        // Mostly the last ones of all.
+        let from = self.faces.partition_point(|face| face.corners[0] < first);
+        let faces = || self.faces[from..].iter().filter(|face| face.corners[0] >= first);
+        let all_right = faces().all(|face| {
+            let area = area(face);
+            !face.corners.iter().any(|corner| is_wrong(&area, *corner))
+        });
+        if all_right {
+            return;
+        }
         let mut means = vec![Vector::zeros(); self.vertices.len() - first as usize];
         let mut wrong = vec![false; means.len()];
-        for face in self.faces.iter().filter(|face| face.corners[0] >= first) {
-            let [p, q, r] = face.corners.map(|i| self.vertices[i as usize]);
-            let area = (q - p).cross(&(r - p));
+        for face in faces() {
+            let area = area(face);
             for corner in face.corners {
                 means[(corner - first) as usize] += area;
-                wrong[(corner - first) as usize] |= area.dot(&self.normals[corner as usize]) <= 0.0;
+                wrong[(corner - first) as usize] |= is_wrong(&area, corner);
             }
         }
         let normals = &mut self.normals[first as usize..];

@@ -18,6 +18,7 @@
 //! viewer of the front view.
 
 mod ball;
+mod bernstein;
 mod bounds;
 mod degrees;
 mod element;
@@ -318,6 +319,10 @@ impl Scene {
                 reach.include(surface.placement.point(vertex), Width::Set(0.0));
             }
         }
+        // Corners are on their patches. With all of them known, most patches are well within the rest.
+        let corners =
+            self.patches.iter().flat_map(|patch| [0, 3].map(|row| [patch.net[row][0], patch.net[row][3]]));
+        corners.flatten().for_each(|corner| reach.include(corner, Width::Set(0.0)));
         for patch in &self.patches {
             if !reach.covers(patch.net.iter().flatten().copied()) {
                 patch.hull().for_each(|point| reach.include(point, Width::Set(0.0)));

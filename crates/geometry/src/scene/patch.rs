@@ -9,6 +9,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
+use super::bernstein::{Column, normal, point, slopes, weights};
 use super::pieces::{FINEST, Steps};
 use super::{MaterialId, Mesh, OwnerId, Placement, Point, Surface, Vector, ball};
 
@@ -215,9 +216,15 @@ fn tessellate(net: &Net, accuracy: f64, steps: Steps, paint: Paint, mesh: &mut M
     let first = mesh.vertices.len() as u32;
     let columns_of: Vec<Column> =
         (0..=columns).map(|i| Column::new(net, i as f64 / columns as f64)).collect();
-    let mut numbers = vec![u32::MAX; (columns + 1) * (rows + 1)];
-    let mut number = |i: usize, j: usize, mesh: &mut Mesh| {
-        let (mut i, mut j) = (i, j);
+    let rows_of = (0..=rows).map(|j| j as f64 / rows as f64).map(|v| (v, weights(v), slopes(v)));
+    let rows_of: Vec<(f64, [f64; 4], [f64; 4])> = rows_of.collect();
+    let width = columns + 1;
+    mesh.vertices.reserve(width * (rows + 1));
+    mesh.normals.reserve(width * (rows + 1));
+    mesh.faces.reserve(2 * columns * rows);
+    let mut numbers = vec![u32::MAX; width * (rows + 1)];
+    let mut add = |i: usize, j: usize, mesh: &mut Mesh| {
+        let (own, mut i, mut j) = (j * width + i, i, j);
         let (mut along, mut across) = (None, None);
         if j == 0 || j == rows {
             let (snapped, u) = snap(i, columns, if j == 0 { bottom } else { top });
@@ -227,14 +234,13 @@ fn tessellate(net: &Net, accuracy: f64, steps: Steps, paint: Paint, mesh: &mut M
             let (snapped, v) = snap(j, rows, if i == 0 { left } else { right });
             (j, across) = (snapped, Some(v));
         }
-        let place = &mut numbers[j * (columns + 1) + i];
-        if *place == u32::MAX {
-            *place = mesh.vertices.len() as u32;
+        if numbers[j * width + i] == u32::MAX {
+            numbers[j * width + i] = mesh.vertices.len() as u32;
             let u = along.unwrap_or_else(|| i as f64 / columns as f64);
-            let v = across.unwrap_or_else(|| j as f64 / rows as f64);
-            // On an edge it may be another one than that of the column.
-            let column = columns_of.get(i).filter(|column| column.u == u);
-            let found = column.map(|column| column.at(net, u, v));
+            let v = across.unwrap_or(rows_of[j].0);
+            // On an edge it may be another one than that of the column and the row.
+            let column = columns_of.get(i).filter(|column| column.u == u && rows_of[j].0 == v);
+            let found = column.map(|column| column.at(net, &rows_of[j]));
             let (point, normal) = found.unwrap_or_else(|| (point(net, u, v), normal(net, u, v)));
             mesh.vertices.push(point);
             mesh.normals.push(normal);
@@ -242,12 +248,25 @@ fn tessellate(net: &Net, accuracy: f64, steps: Steps, paint: Paint, mesh: &mut M
                 mesh.places.push([u, v]);
             }
         }
-        *place
+        numbers[own] = numbers[j * width + i];
     };
+    // In the order in which the corners of squares are met, each once.
     for j in 0..rows {
         for i in 0..columns {
-            let [a, b, c, d] =
-                [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| number(i, j, mesh));
+            let is_first = [i == 0, j == 0];
+            let corners = [(i, j, is_first == [true; 2]), (i + 1, j, is_first[1]), (i + 1, j + 1, true)];
+            for (i, j, is_new) in corners.into_iter().chain([(i, j + 1, is_first[0])]) {
+                if is_new {
+                    add(i, j, mesh);
+                }
+            }
+        }
+    }
+    for j in 0..rows {
+        for i in 0..columns {
+            let corner = j * width + i;
+            let [a, b] = [numbers[corner], numbers[corner + 1]];
+            let [d, c] = [numbers[corner + width], numbers[corner + width + 1]];
             // The diagonal that ends in the patch's own corner, so that no triangle has two of its edges;
             // but where vertices have fallen together, the one that leaves no slivers.
             let along = (i < columns / 2) == (j < rows / 2);
@@ -263,34 +282,6 @@ fn tessellate(net: &Net, accuracy: f64, steps: Steps, paint: Paint, mesh: &mut M
     mesh.orient(first);
 }
 
-/// The curve of a patch at one parameter along its rows: the control points of the curve, and of its slope across. Sums are those of
-/// [`point`] and [`normal`], to the last bit.
-struct Column {
-    u: f64,
-    points: [Vector; 4],
-    slopes: [Vector; 4],
-}
-
-impl Column {
-    fn new(net: &Net, u: f64) -> Column {
-        let of = |weights: [f64; 4]| {
-            net.map(|row| row.iter().zip(weights).fold(Vector::zeros(), |along, (p, u)| along + p.coords * u))
-        };
-        Column { u, points: of(weights(u)), slopes: of(slopes(u)) }
-    }
-
-    /// Place and normal at a parameter along the curve.
-    fn at(&self, net: &Net, u: f64, v: f64) -> (Point, Vector) {
-        let sum = |points: &[Vector; 4], weights: [f64; 4]| {
-            points.iter().zip(weights).fold(Vector::zeros(), |sum, (p, v)| sum + p * v)
-        };
-        let values = weights(v);
-        let across = sum(&self.slopes, values).cross(&sum(&self.points, slopes(v)));
-        let normal = across.try_normalize(1e-9).unwrap_or_else(|| normal(net, u, v));
-        (Point::from(sum(&self.points, values)), normal)
-    }
-}
-
 /// The least of the areas of two triangles, as far as they face as the first normal says; triangles with two
 /// corners in one do not count.
 fn quality(mesh: &Mesh, triangles: &[[u32; 3]; 2]) -> f64 {
@@ -300,46 +291,6 @@ fn quality(mesh: &Mesh, triangles: &[[u32; 3]; 2]) -> f64 {
     };
     let proper = triangles.iter().filter(|[a, b, c]| a != b && b != c && c != a);
     proper.map(facing).fold(f64::INFINITY, f64::min)
-}
-
-/// Bernstein's polynomials of degree three.
-pub(super) fn weights(t: f64) -> [f64; 4] {
-    let s = 1.0 - t;
-    [s * s * s, 3.0 * s * s * t, 3.0 * s * t * t, t * t * t]
-}
-
-/// Their derivatives.
-pub(super) fn slopes(t: f64) -> [f64; 4] {
-    let s = 1.0 - t;
-    [-3.0 * s * s, 3.0 * s * s - 6.0 * s * t, 6.0 * s * t - 3.0 * t * t, 3.0 * t * t]
-}
-
-pub(super) fn sum(net: &Net, of_columns: [f64; 4], of_rows: [f64; 4]) -> Vector {
-    let mut sum = Vector::zeros();
-    for (row, v) in net.iter().zip(of_rows) {
-        let mut along = Vector::zeros();
-        for (point, u) in row.iter().zip(of_columns) {
-            along += point.coords * u;
-        }
-        sum += along * v;
-    }
-    sum
-}
-
-fn point(net: &Net, u: f64, v: f64) -> Point {
-    Point::from(sum(net, weights(u), weights(v)))
-}
-
-/// The unit normal on the front; where an edge shrinks to a point, that of a place nearby.
-fn normal(net: &Net, u: f64, v: f64) -> Vector {
-    for inwards in [0.0, 1e-3, 0.03, 0.3] {
-        let (u, v) = (u + (0.5 - u) * inwards, v + (0.5 - v) * inwards);
-        let across = sum(net, slopes(u), weights(v)).cross(&sum(net, weights(u), slopes(v)));
-        if let Some(normal) = across.try_normalize(1e-9) {
-            return normal;
-        }
-    }
-    Vector::z()
 }
 
 /// A patch cut in four (de Casteljau).

@@ -1,7 +1,8 @@
 //! How many pieces the edges and the grid of a patch have, by accuracy.
 
 use super::Point;
-use super::patch::{Net, column, slopes, sum, weights};
+use super::bernstein::{along_rows, combined, slopes, weights};
+use super::patch::{Net, column};
 
 /// Most pieces along an edge.
 pub(super) const FINEST: usize = 64;
@@ -60,15 +61,14 @@ impl Steps {
 /// a part counts.
 fn estimated_derivatives(net: &Net, within: f64) -> [f64; 3] {
     let mut greatest = [0.0_f64; 3];
-    let at = PROBES.map(|t| (weights(t), slopes(t), bends(t)));
-    for (values_u, slopes_u, bends_u) in &at {
-        for (values_v, slopes_v, bends_v) in &at {
-            let second = [
-                sum(net, *bends_u, *values_v),
-                sum(net, *slopes_u, *slopes_v),
-                sum(net, *values_u, *bends_v),
-            ];
-            let across = sum(net, *slopes_u, *values_v).cross(&sum(net, *values_u, *slopes_v));
+    let at = PROBES.map(|t| [weights(t), slopes(t), bends(t)]);
+    for of_columns in at {
+        // The curves of the patch, its slope and its bend at one place along its rows.
+        let [values, slopes, bends] = of_columns.map(|of_columns| along_rows(net, of_columns));
+        for [values_v, slopes_v, bends_v] in at {
+            let second =
+                [combined(&bends, values_v), combined(&slopes, slopes_v), combined(&values, bends_v)];
+            let across = combined(&slopes, values_v).cross(&combined(&values, slopes_v));
             let normal = across.try_normalize(f64::MIN_POSITIVE);
             for (greatest, second) in greatest.iter_mut().zip(second) {
                 let size = second.norm();

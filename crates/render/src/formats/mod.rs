@@ -5,6 +5,7 @@
 
 pub(crate) mod obj;
 pub(crate) mod png;
+mod rows;
 pub(crate) mod svg;
 
 use std::fmt;

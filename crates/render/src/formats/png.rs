@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::{Content, Description, Drawing, Exporter};
+use super::{Content, Description, Drawing, Exporter, rows};
 use crate::lens::Lens;
 use crate::light::Spot;
 use crate::lighting::Lighting;
@@ -157,8 +157,10 @@ impl<'m> Lit<'m> {
     }
 
     /// The corners of a triangle on the grid of the rasteriser, once the origin stays.
+    #[inline(always)]
     pub(crate) fn snapped(&self, n: usize) -> [Place; 3] {
-        self.mesh.faces[n].corners.map(|(vertex, _)| self.snapped[vertex as usize])
+        let [(p, _), (q, _), (r, _)] = self.mesh.faces[n].corners;
+        [self.snapped[p as usize], self.snapped[q as usize], self.snapped[r as usize]]
     }
 
     /// The corners of a triangle.
@@ -327,30 +329,54 @@ impl Canvas<'_> {
     }
 }
 
+/// Pixels of which it is told at once whether all of them are empty, as most of a picture is.
+const BLOCK: usize = 16;
+
 /// The bytes of one image that fills a page; a sky stands behind it where there is a background.
 fn composed(page: &Page, sky: Option<&Sky>, image: &Image) -> Vec<u8> {
-    let mut data = Vec::with_capacity(image.pixels.len() * if page.background.is_some() { 3 } else { 4 });
+    let Some(color) = page.background else { return uncovered(image) };
+    let mut data = Vec::with_capacity(3 * image.pixels.len());
+    let mut empty: Vec<u8> = Vec::new();
     for (line, row) in image.pixels.chunks_exact(image.width.max(1)).enumerate() {
         let part = (line as f64 + 0.5) / image.height.max(1) as f64;
-        let background = page.background.map(|color| sky.map_or(color, |sky| sky.color(part)));
-        let background = background.map(|color| [color.red, color.green, color.blue]);
-        for &[red, green, blue, opacity] in row {
-            let (color, open) = ([red, green, blue], u32::from(255 - opacity));
-            match background {
-                Some(_) if open == 0 => data.extend(color),
-                Some(background) if open == 255 => data.extend(background),
-                Some(background) => data.extend([0, 1, 2].map(|k| {
-                    let behind = (u32::from(background[k]) * open + 127) / 255;
-                    (u32::from(color[k]) + behind).min(255) as u8
-                })),
-                None if open == 0 => data.extend([red, green, blue, 255]),
-                None => {
-                    let whole = u32::from(opacity.max(1));
-                    data.extend(color.map(|c| ((u32::from(c) * 255 + whole / 2) / whole).min(255) as u8));
-                    data.push(opacity);
-                }
+        let background = sky.map_or(color, |sky| sky.color(part));
+        let background = [background.red, background.green, background.blue];
+        let start = data.len();
+        if sky.is_some() || line == 0 {
+            empty.clear();
+            (0..row.len()).for_each(|_| empty.extend(background));
+        }
+        data.extend_from_slice(&empty);
+        let over = data[start..].as_chunks_mut::<3>().0.chunks_mut(BLOCK);
+        for (pixels, over) in row.chunks(BLOCK).zip(over) {
+            let all = pixels.iter().fold(0, |all, pixel| all | u32::from_ne_bytes(*pixel));
+            if all == 0 {
+                continue;
+            }
+            for (&[red, green, blue, opacity], over) in pixels.iter().zip(over) {
+                let (color, open) = ([red, green, blue], u32::from(255 - opacity));
+                *over = match open {
+                    0 => color,
+                    255 => background,
+                    _ => [0, 1, 2].map(|k| {
+                        let behind = (u32::from(background[k]) * open + 127) / 255;
+                        (u32::from(color[k]) + behind).min(255) as u8
+                    }),
+                };
             }
         }
+    }
+    data
+}
+
+/// The bytes of an image without a background: colours, and opacities.
+fn uncovered(image: &Image) -> Vec<u8> {
+    let mut data = Vec::with_capacity(4 * image.pixels.len());
+    for &[red, green, blue, opacity] in &image.pixels {
+        let whole = u32::from(opacity.max(1));
+        let color = [red, green, blue];
+        data.extend(color.map(|c| ((u32::from(c) * 255 + whole / 2) / whole).min(255) as u8));
+        data.push(opacity);
     }
     data
 }
@@ -362,12 +388,13 @@ pub(crate) fn file(page: &Page, title: &str, data: &[u8]) -> Vec<u8> {
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(if page.background.is_some() { png::ColorType::Rgb } else { png::ColorType::Rgba });
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Fast);
     // PNG's own texts are of another alphabet.
     let _ = encoder.add_itxt_chunk("Title".to_owned(), title.to_owned());
     // Writing to memory does not fail, and the sizes are right.
+    let pixel = if page.background.is_some() { 3 } else { 4 };
+    let rows = rows::compressed(data, width as usize * pixel, pixel);
     let written = encoder.write_header().and_then(|mut writer| {
-        writer.write_image_data(data)?;
+        writer.write_chunk(png::chunk::IDAT, &rows?)?;
         writer.finish()
     });
     debug_assert!(written.is_ok(), "{written:?}");

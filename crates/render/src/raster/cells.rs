@@ -2,6 +2,9 @@
 
 use std::ops::Range;
 
+use wide::bytemuck::cast;
+use wide::{f32x4, i32x4};
+
 use super::plane::Ready;
 use super::{Corner, EQUAL, Place, STEPS};
 use crate::mapping::Cut;
@@ -12,6 +15,9 @@ const LANES: usize = 4;
 const BLOCK: usize = 64;
 /// The largest side of a small triangle, in steps.
 const SMALL: i64 = 24 * STEPS;
+/// The odd ones of four pixels, and the last two.
+const ONES: i32x4 = i32x4::new([0, -1, 0, -1]);
+const TWOS: i32x4 = i32x4::new([0, 0, -1, -1]);
 /// Half a pixel.
 const HALF: i64 = STEPS / 2;
 
@@ -76,7 +82,8 @@ fn is_small(corners: &[Place; 3]) -> bool {
 }
 
 impl Nearest<1> {
-    /// Adds a small triangle. It works on several pixels at a time, without branches.
+    /// Adds a small triangle, four pixels at a time.
+    #[inline(always)]
     fn add_small(
         &mut self,
         number: u32,
@@ -90,28 +97,40 @@ impl Nearest<1> {
         let first = columns.start.min(width - count);
         let ahead = [(first, ready.columns[0]), (rows.start, ready.rows[0])]
             .map(|(to, from)| STEPS * (to as i64 - from as i64) + HALF);
-        let mut start = ready.sides.map(|[value, a, b]| (value + a * ahead[0] + b * ahead[1]) as i32);
-        let [right, down] = [1, 2].map(|k| ready.sides.map(|side| (side[k] * STEPS) as i32));
+        let each = |[value, a, b]: [i64; 3]| {
+            let value = (value + a * ahead[0] + b * ahead[1]) as i32;
+            let right = (a * STEPS) as i32;
+            // Numbers that are stored one by one and loaded together would be waited for.
+            i32x4::splat(value) + (i32x4::splat(right) & ONES) + (i32x4::splat(2 * right) & TWOS)
+        };
+        let mut start = ready.sides.map(each);
+        let further = ready.sides.map(|[_, a, _]| i32x4::splat((a * STEPS) as i32 * LANES as i32));
+        let down = ready.sides.map(|[_, _, b]| i32x4::splat((b * STEPS) as i32));
+        let number = i32x4::splat(number as i32);
         for row in rows {
             let mut here = start;
-            (0..3).for_each(|k| start[k] += down[k]);
-            let (mut depth, slope) = plane.along([first, row]);
+            (0..3).for_each(|side| start[side] += down[side]);
+            let (depth, slope) = plane.along([first, row]);
+            let along = f32x4::splat(slope) * f32x4::new([0.0, 1.0, 2.0, 3.0]);
             let cells = row * width + first..row * width + first + count;
-            let held = self.numbers[cells.clone()].as_chunks_mut::<LANES>().0;
-            let behind = self.depths[cells].as_chunks_mut::<LANES>().0;
+            let held = self.numbers.as_flattened_mut()[cells.clone()].as_chunks_mut::<LANES>().0;
+            let behind = self.depths.as_flattened_mut()[cells].as_chunks_mut::<LANES>().0;
+            let mut depth = f32x4::splat(depth);
             for (held, behind) in held.iter_mut().zip(behind) {
-                for k in 0..LANES {
-                    let by = k as i32;
-                    let [p, q, r] = [0, 1, 2].map(|side| here[side] + right[side] * by);
-                    let depth = plane.bounded(depth + slope * by as f32);
-                    // Later ones have greater numbers.
-                    let is_seen = (p | q | r >= 0) & (depth + EQUAL >= behind[k][0]);
-                    let nearest = if depth > behind[k][0] { depth } else { behind[k][0] };
-                    behind[k][0] = if is_seen { nearest } else { behind[k][0] };
-                    held[k][0] = if is_seen { number } else { held[k][0] };
+                let [p, q, r] = here;
+                (0..3).for_each(|side| here[side] += further[side]);
+                let outside = p | q | r;
+                let (here, far) = (plane.bounded_four(depth + along), f32x4::new(*behind));
+                depth += f32x4::splat(slope * LANES as f32);
+                // Later ones have greater numbers.
+                let is_nearer = cast::<f32x4, i32x4>((here + f32x4::splat(EQUAL)).simd_ge(far));
+                let is_seen: i32x4 = is_nearer & !(outside >> 31_i32);
+                if is_seen.to_bitmask() == 0 {
+                    continue;
                 }
-                (0..3).for_each(|side| here[side] += right[side] * LANES as i32);
-                depth += slope * LANES as f32;
+                *held = cast(is_seen.select(number, cast(*held)));
+                let nearest = cast::<i32x4, f32x4>(is_seen).select(here.fast_max(far), far);
+                *behind = cast(nearest);
             }
             let [from, end] = &mut spans[row];
             (*from, *end) = ((*from).min(columns.start as u32), (*end).max(columns.end as u32));

@@ -3,57 +3,65 @@
 //! Samples are bits of a mask. Most triangles in a pixel are neighbours on one surface, whose masks have no bit in common; so depths are
 //! looked at only where masks overlap, and sample by sample only where two triangles pass through one another in the pixel.
 
+use wide::{f32x4, i32x4};
+
 use super::plane::Plane;
 use super::{EQUAL, STEPS};
 
-/// Sides with fewer steps along each axis are tested with floats, where all values are exact integers; and bound of a side's function,
-/// beyond which its value does not matter.
-const SHORTEST: i64 = 1 << 11;
-const FLOAT_LIMIT: i64 = 1 << 23;
+/// Sides with fewer steps along each axis take 32 bits; and bound of a side's function, beyond which its value does not matter.
+const SHORTEST: i64 = 1 << 15;
+const LIMIT: i64 = 1 << 30;
+/// Most samples, in fours.
+const FOURS: usize = 4;
 
 /// Places of the samples in a pixel, in steps from its upper left corner: all x, all y.
 pub(super) type Places<const N: usize> = [[f32; N]; 2];
 
 /// What the samples of a pixel add to the functions of a triangle's sides.
 pub(super) enum Cover<const N: usize> {
-    Short([[f32; N]; 3]),
+    /// Four samples after four.
+    Short([[i32x4; FOURS]; 3]),
     Long([[i64; N]; 3]),
 }
 
 impl<const N: usize> Cover<N> {
     /// For the growth of each side's function by a step to the right and down.
-    pub(super) fn new(sides: &[[i64; 3]; 3], [xs, ys]: &Places<N>) -> Cover<N> {
+    #[inline(always)]
+    pub(super) fn new(sides: &[[i64; 3]; 3], places: &Places<N>) -> Cover<N> {
+        const { assert!(N.is_multiple_of(4) && N <= 4 * FOURS) };
         if sides.iter().all(|[_, a, b]| a.abs() < SHORTEST && b.abs() < SHORTEST) {
-            let mut added = [[0.0; N]; 3];
+            let [xs, ys] = places.each_ref().map(|places| places.as_chunks::<4>().0);
+            let mut added = [[i32x4::ZERO; FOURS]; 3];
             for (added, [_, a, b]) in added.iter_mut().zip(sides) {
-                let (a, b) = (*a as f32, *b as f32);
-                for ((added, x), y) in added.iter_mut().zip(xs).zip(ys) {
-                    *added = a * x + b * y;
+                let (a, b) = (f32x4::splat(*a as f32), f32x4::splat(*b as f32));
+                for k in 0..N / 4 {
+                    // All these numbers are whole, and less than 2^24.
+                    added[k] = (a * f32x4::new(xs[k]) + b * f32x4::new(ys[k])).fast_trunc_int();
                 }
             }
             return Cover::Short(added);
         }
+        let [xs, ys] = places;
         let added = sides.map(|[_, a, b]| std::array::from_fn(|s| a * xs[s] as i64 + b * ys[s] as i64));
         Cover::Long(added)
     }
 
-    /// The samples within all sides, given the values of the sides' functions at the pixel. The loop has no branches, so that the compiler
-    /// makes it work on several samples at a time.
+    /// The samples within all sides, given the values of the sides' functions at the pixel.
+    #[inline(always)]
     pub(super) fn mask(&self, here: [i64; 3]) -> u32 {
         let mut outside = 0;
         match self {
             Cover::Short([a, b, c]) => {
-                let [p, q, r] = here.map(|value| value.clamp(-FLOAT_LIMIT, FLOAT_LIMIT) as f32);
-                for s in 0..N {
-                    let negative = (p + a[s]).to_bits() | (q + b[s]).to_bits() | (r + c[s]).to_bits();
-                    outside |= ((negative as i32 >> 31) as u32) & (1 << s);
+                let at = |side: usize| i32x4::splat(here[side].clamp(-LIMIT, LIMIT) as i32);
+                let [p, q, r] = [at(0), at(1), at(2)];
+                for k in 0..N / 4 {
+                    outside |= ((p + a[k]) | (q + b[k]) | (r + c[k])).to_bitmask() << (4 * k);
                 }
             }
             Cover::Long([a, b, c]) => {
                 let [p, q, r] = here;
                 for s in 0..N {
-                    let negative = (p + a[s]) | (q + b[s]) | (r + c[s]);
-                    outside |= ((negative >> 63) as u32) & (1 << s);
+                    outside |= u32::from((p + a[s]) | (q + b[s]) | (r + c[s]) < 0) << s;
                 }
             }
         }
@@ -91,14 +99,13 @@ impl<const N: usize> Fragments<N> {
     pub(super) const EMPTY: Fragments<N> =
         Fragments { count: 0, places: [0; N], masks: [0; N], fars: [0.0; N] };
 
-    /// Forgets all triangles; of one that had the whole pixel its place and depth stay.
-    pub(super) fn begin(&mut self, whole: Option<(u32, f32)>) {
-        self.count = 0;
-        if let Some((place, far)) = whole {
-            self.push(place, full::<N>(), far);
-        }
+    /// Begins with a triangle that has the whole pixel, given its place and depth.
+    #[inline(always)]
+    pub(super) fn begin(&mut self, place: u32, far: f32) {
+        self.push(place, full::<N>(), far);
     }
 
+    #[inline(always)]
     fn push(&mut self, place: u32, mask: u32, far: f32) {
         let i = self.count as usize;
         (self.places[i], self.masks[i], self.fars[i]) = (place, mask, far);
@@ -106,6 +113,7 @@ impl<const N: usize> Fragments<N> {
     }
 
     /// Gives a triangle the samples of its mask at which it is in front, and returns a depth that no sample is behind.
+    #[inline(always)]
     pub(super) fn add(
         &mut self,
         new: Fragment,
@@ -144,6 +152,7 @@ impl<const N: usize> Fragments<N> {
     }
 
     /// The samples of a mask at which a triangle is before the one of this number. Of two at one depth, the later one is.
+    #[inline(always)]
     fn won(&self, i: usize, new: Fragment, planes: &[Plane], places: &Places<N>, pixel: [usize; 2]) -> u32 {
         let Some((held, plane)) = planes.get(self.places[i] as usize).zip(planes.get(new.place as usize))
         else {
@@ -174,6 +183,7 @@ impl<const N: usize> Fragments<N> {
 
     /// The mean colour of the samples, of which those of no surface have the colour `open`. Each surface is shaded where its first sample is:
     /// the first ones are in the middle.
+    #[inline(always)]
     pub(super) fn mean(
         &self,
         surface: impl Fn(u32) -> u32,
@@ -182,30 +192,41 @@ impl<const N: usize> Fragments<N> {
     ) -> [u8; 4] {
         let (mut sum, mut left) = ([0_u32; 4], N as u32);
         let count = self.count as usize;
-        let surfaces: [u32; N] = {
-            let mut surfaces = [0; N];
-            (0..count).for_each(|i| surfaces[i] = surface(self.places[i]));
-            surfaces
-        };
+        let mut surfaces = [0; N];
+        for (own, place) in surfaces.iter_mut().zip(&self.places[..count]) {
+            *own = surface(*place);
+        }
+        let mut is_done = 0_u32;
         for i in 0..count {
-            if surfaces[..i].contains(&surfaces[i]) {
+            if is_done >> i & 1 == 1 {
                 continue;
             }
-            let same = (i..count).filter(|&k| surfaces[k] == surfaces[i]);
-            let (mut first, mut mask) = (i, 0);
-            for k in same {
-                if self.masks[k].trailing_zeros() < self.masks[first].trailing_zeros() {
-                    first = k;
+            let (mut first, mut mask) = (self.places[i], self.masks[i]);
+            for k in i + 1..count {
+                if surfaces[k] == surfaces[i] {
+                    is_done |= 1 << k;
+                    let other = self.masks[k];
+                    // No two have a sample in common.
+                    if other & other.wrapping_neg() < mask & mask.wrapping_neg() {
+                        first = self.places[k];
+                    }
+                    mask |= other;
                 }
-                mask |= self.masks[k];
             }
-            let painted = color(self.places[first]);
+            let painted = color(first);
             let weight = mask.count_ones();
+            if weight == N as u32 {
+                return painted;
+            }
             left -= weight;
-            sum.iter_mut().zip(painted).for_each(|(sum, channel)| *sum += weight * u32::from(channel));
+            for (sum, channel) in sum.iter_mut().zip(painted) {
+                *sum += weight * u32::from(channel);
+            }
         }
         if left > 0 {
-            sum.iter_mut().zip(open()).for_each(|(sum, channel)| *sum += left * u32::from(channel));
+            for (sum, channel) in sum.iter_mut().zip(open()) {
+                *sum += left * u32::from(channel);
+            }
         }
         sum.map(|total| ((total + N as u32 / 2) / N as u32) as u8)
     }

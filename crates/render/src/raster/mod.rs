@@ -12,7 +12,10 @@
 mod band;
 pub(super) mod cells;
 mod fragments;
+mod lanes;
+mod list;
 mod plane;
+mod resolve;
 pub(super) mod samples;
 
 use std::ops::Range;
@@ -20,6 +23,7 @@ use std::sync::{Mutex, PoisonError};
 
 use super::mapping::Cut;
 use band::Band;
+use list::List;
 
 /// Rows in a band.
 pub(super) const BAND: usize = 16;
@@ -116,7 +120,8 @@ pub(super) trait Triangles: Sync {
 
 /// The first and the last row of those above `end` that may show some of a triangle.
 pub(super) fn rows_of(triangles: &impl Triangles, number: usize, end: usize) -> Option<[usize; 2]> {
-    range(triangles.corners(number).map(|corner| i64::from(corner.y)), end)
+    let [p, q, r] = triangles.corners(number);
+    range([p.y, q.y, r.y], end)
 }
 
 /// Draws triangles in some rows of a picture that is so wide and high. `pixels` are those of the rows.
@@ -129,23 +134,27 @@ pub(super) fn draw<const N: usize>(
     pixels: &mut [[u8; 4]],
 ) {
     // Triangles that each band may show, in order.
-    let mut bands: Vec<Vec<u32>> = vec![Vec::new(); rows.len().div_ceil(BAND)];
+    let mut bands: Vec<List> = Vec::new();
+    bands.resize_with(rows.len().div_ceil(BAND), List::default);
     for number in 0..triangles.count() {
-        let of_picture = rows_of(triangles, number, rows.end.min(height));
+        let [p, q, r] = triangles.corners(number);
+        let of_picture = range([p.y, q.y, r.y], rows.end.min(height));
         if let Some([first, last]) = of_picture.filter(|[_, last]| *last >= rows.start) {
             let [first, last] = [first, last].map(|row| row.saturating_sub(rows.start) / BAND);
             let last = last.min(bands.len().saturating_sub(1));
-            bands[first..=last].iter_mut().for_each(|band| band.push(number as u32));
+            let nearest = f32::MIN.max(p.depth).max(q.depth).max(r.depth);
+            let surface = triangles.surface(number);
+            bands[first..=last].iter_mut().for_each(|band| band.push(number as u32, surface, nearest));
         }
     }
     let work = Mutex::new(pixels.chunks_mut((BAND * width).max(1)).zip(&bands).enumerate());
     let draw_bands = || {
         let mut band = Band::new(pattern, width);
         let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
-        while let Some((index, (pixels, numbers))) = next() {
+        while let Some((index, (pixels, list))) = next() {
             let top = rows.start + index * BAND;
-            band.draw(triangles, numbers, top..(top + BAND).min(rows.end));
-            band.resolve(triangles, numbers, top, pixels);
+            band.draw(triangles, list, top..(top + BAND).min(rows.end));
+            band.resolve(triangles, list, top, pixels);
         }
     };
     std::thread::scope(|scope| {
@@ -183,14 +192,18 @@ impl Triangles for Plain<'_> {
 
 /// A coordinate in steps.
 fn snap(x: f64) -> i64 {
-    (x.clamp(-FARTHEST, FARTHEST) * STEPS as f64).round() as i64
+    let steps = x.clamp(-FARTHEST, FARTHEST) * STEPS as f64;
+    // To the nearest, without a call of the mathematical library.
+    (steps + 0.5_f64.copysign(steps)) as i64
 }
 
 /// First and last of `end` rows or columns that what has these coordinates, in steps, may touch.
-fn range(at: [i64; 3], end: usize) -> Option<[usize; 2]> {
-    let low = at[0].min(at[1]).min(at[2]).div_euclid(STEPS).max(0);
-    let high = at[0].max(at[1]).max(at[2]).div_euclid(STEPS).min(end as i64 - 1);
-    (low <= high).then_some([low as usize, high as usize])
+#[inline(always)]
+fn range(at: [i32; 3], end: usize) -> Option<[usize; 2]> {
+    let low = at[0].min(at[1]).min(at[2]).div_euclid(STEPS as i32).max(0) as usize;
+    let high = at[0].max(at[1]).max(at[2]).div_euclid(STEPS as i32);
+    let high = (high.max(-1) as isize).min(end as isize - 1);
+    (low as isize <= high).then_some([low, high as usize])
 }
 
 /// Corners in the order that gives a positive area, and their depths. Places are in steps.
@@ -206,41 +219,35 @@ struct Oriented {
 struct Side {
     a: i64,
     b: i64,
-    /// A place on it.
-    through: [i64; 2],
     /// -1 if places on it belong to the triangle on the other side, else 0.
     bias: i64,
 }
 
 impl Oriented {
     /// `None` if it has no area.
-    fn new(mut at: [[i64; 2]; 3], mut depths: [f64; 3]) -> Option<Oriented> {
-        let [[ax, ay], [bx, by], [cx, cy]] = at;
-        let area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax);
+    #[inline(always)]
+    fn new([p, mut q, mut r]: [Place; 3]) -> Option<Oriented> {
+        let wide = |a: i32, b: i32| i64::from(a) - i64::from(b);
+        let area = wide(q.x, p.x) * wide(r.y, p.y) - wide(q.y, p.y) * wide(r.x, p.x);
         if area == 0 {
             return None;
         }
         if area < 0 {
-            at.swap(1, 2);
-            depths.swap(1, 2);
+            std::mem::swap(&mut q, &mut r);
         }
-        Some(Oriented { at, depths, area: area.unsigned_abs() as f64 })
+        let at = |place: Place| [place.x.into(), place.y.into()];
+        let depths = [p.depth.into(), q.depth.into(), r.depth.into()];
+        Some(Oriented { at: [at(p), at(q), at(r)], depths, area: area.unsigned_abs() as f64 })
     }
+}
 
-    /// The side opposite of each corner.
-    fn sides(&self) -> [Side; 3] {
-        [0, 1, 2].map(|k| {
-            let ([px, py], [qx, qy]) = (self.at[(k + 1) % 3], self.at[(k + 2) % 3]);
-            let (a, b) = (py - qy, qx - px);
-            let bias = if a > 0 || (a == 0 && b > 0) { 0 } else { -1 };
-            Side { a, b, through: [px, py], bias }
-        })
-    }
-
-    /// The least and the greatest depth.
-    fn reach(&self) -> [f64; 2] {
-        let bounds = [f64::INFINITY, f64::NEG_INFINITY];
-        self.depths.iter().fold(bounds, |[low, high], &z| [low.min(z), high.max(z)])
+impl Side {
+    /// The side from one corner to the next one.
+    #[inline(always)]
+    fn new(from: [i64; 2], to: [i64; 2]) -> Side {
+        let (a, b) = (from[1] - to[1], to[0] - from[0]);
+        let is_own = (a > 0) | ((a == 0) & (b > 0));
+        Side { a, b, bias: i64::from(is_own) - 1 }
     }
 }
 

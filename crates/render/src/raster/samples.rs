@@ -1,5 +1,8 @@
 //! Which triangle is the nearest at several samples of some pixels: those in which edges are.
 
+use wide::bytemuck::cast;
+use wide::{f32x4, i32x4};
+
 use super::band::left_of;
 use super::cells::{Given, Nearest};
 use super::fragments::{self, Cover, Places};
@@ -11,6 +14,8 @@ use crate::mapping::Cut;
 pub(crate) const EIGHT: Pattern<8> = [(1, -3), (-1, 3), (5, 1), (-3, -5), (-5, 5), (-7, -1), (3, 7), (7, -7)];
 /// Pixels along a side of a block.
 const BLOCK: usize = 8;
+/// The first four bits.
+const BITS: i32x4 = i32x4::new([1, 2, 4, 8]);
 /// The first column of a block.
 const COLUMN: u64 = 0x0101_0101_0101_0101;
 
@@ -65,26 +70,20 @@ impl Blocks {
         blocks
     }
 
-    /// Of each block in which something at this depth may be seen its first pixel, and its pixels within a rectangle, given by its first and last columns and
-    /// rows.
-    fn open(&self, [columns, rows]: [[usize; 2]; 2], depth: f32) -> impl Iterator<Item = ([usize; 2], u64)> {
-        // The bits from the first to the last of a range that is within a block in part.
-        let within = |block: usize, [first, last]: [usize; 2], apart: u32| {
-            let (from, to) = (first.saturating_sub(block * BLOCK), (last - block * BLOCK).min(BLOCK - 1));
-            let bits = u64::MAX >> (64 - apart * (to + 1) as u32);
-            bits & !0 << (apart * from as u32)
-        };
-        let blocks = |[first, last]: [usize; 2]| first / BLOCK..=last / BLOCK;
-        blocks(rows).flat_map(move |row| {
-            let lines = within(row, rows, BLOCK as u32);
-            blocks(columns).filter_map(move |column| {
-                let block = row * self.width + column;
-                let is_open = depth + EQUAL >= self.far[block];
-                let pixels = self.pixels[block] & lines & (within(column, columns, 1) * COLUMN);
-                (is_open && pixels != 0).then_some(([column * BLOCK, row * BLOCK], pixels))
-            })
-        })
+    /// The pixels that have samples in a block, of those within some lines and columns of blocks, if something at this depth may be seen there.
+    #[inline(always)]
+    fn open(&self, block: usize, within: u64, depth: f32) -> u64 {
+        let pixels = self.pixels[block] & within;
+        if pixels != 0 && depth + EQUAL >= self.far[block] { pixels } else { 0 }
     }
+}
+
+/// The bits from the first to the last of a range that are within a block, which are so far apart.
+#[inline(always)]
+fn within(block: usize, [first, last]: [usize; 2], apart: u32) -> u64 {
+    let (from, to) = (first.saturating_sub(block * BLOCK), (last - block * BLOCK).min(BLOCK - 1));
+    let bits = u64::MAX >> (64 - apart * (to + 1) as u32);
+    bits & !0 << (apart * from as u32)
 }
 
 /// Where there are samples.
@@ -114,16 +113,22 @@ impl<'c, const N: usize> Drawn<'c, N> {
 
     /// The values of the functions of the sides at the corner of a pixel.
     fn at(&self, [column, row]: [usize; 2]) -> [i64; 3] {
-        let Ready { columns, rows, sides, .. } = &self.ready;
-        let by = [column as i64 - columns[0] as i64, row as i64 - rows[0] as i64].map(|by| by * STEPS);
-        sides.map(|[value, a, b]| value + a * by[0] + b * by[1])
+        let Ready { columns, rows, sides: [p, q, r], .. } = &self.ready;
+        let right = (column as i64 - columns[0] as i64) * STEPS;
+        let down = (row as i64 - rows[0] as i64) * STEPS;
+        [p, q, r].map(|[value, a, b]| value + a * right + b * down)
     }
 
     /// Whether all of so many pixels to the right and down from one are outside.
-    fn is_beside(&self, pixel: [usize; 2], count: usize) -> bool {
-        let here = self.at(pixel);
-        let most = self.most.map(|most| most * count as i64);
-        (here[0] + most[0]) | (here[1] + most[1]) | (here[2] + most[2]) < 0
+    fn is_beside(&self, pixel: [usize; 2], count: i64) -> bool {
+        self.is_outside(self.at(pixel), count)
+    }
+
+    /// The same, given the values at the corner of that one.
+    #[inline(always)]
+    fn is_outside(&self, here: [i64; 3], count: i64) -> bool {
+        let most = self.most;
+        (here[0] + most[0] * count) | (here[1] + most[1] * count) | (here[2] + most[2] * count) < 0
     }
 }
 
@@ -137,31 +142,35 @@ impl<const N: usize> Nearest<N> {
         is_open: impl Fn(usize, f32) -> bool,
     ) {
         let [width, height] = area.size;
-        let columns = range(corners.map(|corner| i64::from(corner.x)), width);
-        let rows = range(corners.map(|corner| i64::from(corner.y)), height);
-        let Some((columns, rows)) = columns.zip(rows) else { return };
-        let front = corners[0].depth.max(corners[1].depth).max(corners[2].depth);
+        let [p, q, r] = corners;
+        let Some(columns) = range([p.x, q.x, r.x], width) else { return };
+        let Some(rows) = range([p.y, q.y, r.y], height) else { return };
+        let front = p.depth.max(q.depth).max(r.depth);
         // Most triangles touch no pixel that has samples.
         let (mut drawn, mut cut): (Option<Drawn<N>>, _) = (None, Some(cut));
-        for (first, mut pixels) in blocks.open([columns, rows], front) {
-            if drawn.as_ref().is_some_and(|drawn| drawn.is_beside(first, BLOCK)) {
-                continue;
-            }
-            while pixels != 0 {
-                let bit = pixels.trailing_zeros() as usize;
-                pixels &= pixels - 1;
-                let pixel = [first[0] + bit % BLOCK, first[1] + bit / BLOCK];
-                let place = area.places[pixel[1] * width + pixel[0]] as usize - 1;
-                if !is_open(place, front) {
+        for row in rows[0] / BLOCK..rows[1] / BLOCK + 1 {
+            let lines = within(row, rows, BLOCK as u32);
+            for column in columns[0] / BLOCK..columns[1] / BLOCK + 1 {
+                let bits = lines & (within(column, columns, 1) * COLUMN);
+                let mut pixels = blocks.open(row * blocks.width + column, bits, front);
+                let first = [column * BLOCK, row * BLOCK];
+                if pixels == 0 || drawn.as_ref().is_some_and(|drawn| drawn.is_beside(first, BLOCK as i64)) {
                     continue;
                 }
-                if drawn.is_none() {
-                    let ready = Ready::new(corners, width, &(0..height));
-                    let cut = cut.take().and_then(|cut| cut());
-                    drawn = ready.map(|ready| Drawn::new(number as u32 + 1, ready, cut, area.samples));
-                }
-                let Some(drawn) = &drawn else { return };
-                if !drawn.is_beside(pixel, 1) {
+                while pixels != 0 {
+                    let bit = pixels.trailing_zeros() as usize;
+                    pixels &= pixels - 1;
+                    let pixel = [first[0] + bit % BLOCK, first[1] + bit / BLOCK];
+                    let place = area.places[pixel[1] * width + pixel[0]] as usize - 1;
+                    if !is_open(place, front) {
+                        continue;
+                    }
+                    if drawn.is_none() {
+                        let ready = Ready::new(corners, width, &(0..height));
+                        let cut = cut.take().and_then(|cut| cut());
+                        drawn = ready.map(|ready| Drawn::new(number as u32 + 1, ready, cut, area.samples));
+                    }
+                    let Some(drawn) = &drawn else { return };
                     self.add_at(place, area, drawn, pixel);
                 }
             }
@@ -171,22 +180,30 @@ impl<const N: usize> Nearest<N> {
     /// Adds a triangle in a pixel.
     fn add_at(&mut self, place: usize, area: &Area<N>, drawn: &Drawn<N>, pixel: [usize; 2]) {
         let [xs, ys] = area.samples;
-        let covered = drawn.cover.mask(drawn.at(pixel));
+        let here = drawn.at(pixel);
+        if drawn.is_outside(here, 1) {
+            return;
+        }
+        let covered = drawn.cover.mask(here);
         let mask = drawn.cut.as_ref().map_or(covered, |cut| left_of(cut, covered, pixel, area.samples));
         if mask == 0 {
             return;
         }
         let plane = &drawn.ready.plane;
         let base = plane.at(pixel);
-        let (numbers, depths) = (&mut self.numbers[place], &mut self.depths[place]);
-        // Without branches, so that the compiler works on several samples at a time.
-        for s in 0..N {
-            let depth = plane.sample(base, [xs[s], ys[s]]);
-            let least = if drawn.number > numbers[s] { depth + EQUAL } else { depth - EQUAL };
-            let is_nearer = mask >> s & 1 == 1 && least >= depths[s];
-            let nearest = if depth > depths[s] { depth } else { depths[s] };
-            depths[s] = if is_nearer { nearest } else { depths[s] };
-            numbers[s] = if is_nearer { drawn.number } else { numbers[s] };
+        let numbers = self.numbers[place].as_chunks_mut::<4>().0;
+        let depths = self.depths[place].as_chunks_mut::<4>().0;
+        let [xs, ys] = [xs, ys].map(|at| at.as_chunks::<4>().0);
+        let (number, equal) = (i32x4::splat(drawn.number as i32), f32x4::splat(EQUAL));
+        for k in 0..N / 4 {
+            let (held, far) = (cast::<[u32; 4], i32x4>(numbers[k]), f32x4::new(depths[k]));
+            let depth = plane.samples(base, [f32x4::new(xs[k]), f32x4::new(ys[k])]);
+            let is_later: f32x4 = cast(number.simd_gt(held));
+            let least = is_later.select(depth + equal, depth - equal);
+            let is_covered = (i32x4::splat((mask >> (4 * k)) as i32) & BITS).simd_eq(BITS);
+            let is_nearer = is_covered & cast::<f32x4, i32x4>(least.simd_ge(far));
+            numbers[k] = cast(is_nearer.select(number, held));
+            depths[k] = cast(cast::<i32x4, f32x4>(is_nearer).select(depth.fast_max(far), far));
         }
     }
 }

@@ -79,6 +79,9 @@ const STRAIGHT: f64 = 0.4;
 /// The least area that an outline surrounds, in cells: less covers no more than a fiftieth of a pixel.
 const LEAST_AREA: f64 = 0.1;
 
+/// Most outlines have no more places by far.
+const SHORT: usize = 64;
+
 /// A corner of an outline, in cells from the upper left corner of the mask.
 pub type Corner = [f64; 2];
 
@@ -94,8 +97,8 @@ where
         (self.inside)(cell) && !(self.inside)(cell - self.width)
     }
 
-    /// Where the set ends between the centres of two neighbours.
-    fn crossing(&self, inner: usize, outer: usize) -> Place {
+    /// Where the set ends between the centres of two neighbours, given the column and row of the first, and the way to the other.
+    fn crossing(&self, [inner, outer]: [usize; 2], [at, way]: [[f64; 2]; 2]) -> Place {
         let between = |a: f64, b: f64| {
             let (high, low) = (a.max(0.5), b.min(0.5));
             if high == low { 0.5 } else { (high - 0.5) / (high - low) }
@@ -121,9 +124,7 @@ where
                 (a, b) => self.edge([inner, outer], [a, b]),
             },
         };
-        let [p, q] = [inner, outer].map(|cell| [cell % self.width, cell / self.width].map(|x| x as f64));
-        let at = [0, 1].map(|k| p[k] + 0.5 + t * (q[k] - p[k]));
-        Place { at, tolerance }
+        Place { at: [at[0] + 0.5 + t * way[0], at[1] + 0.5 + t * way[1]], tolerance }
     }
 
     /// Where an item ends that covers these parts of two neighbours, from the centre of the inner one, and the tolerance there: so that
@@ -147,12 +148,16 @@ where
         let up_left = (self.width + 1).wrapping_neg();
         let right_of = [0, steps[2], up_left, steps[3]];
         let left_of = [steps[3], 0, steps[2], up_left];
+        // Columns and rows of the cells on the right, from that corner; and the ways to those on the left.
+        const RIGHT: [[f64; 2]; 4] = [[0.0, 0.0], [-1.0, 0.0], [-1.0, -1.0], [0.0, -1.0]];
+        const WAYS: [[f64; 2]; 4] = [[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]];
+        const AHEAD: [[i64; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
         let (mut at, mut direction) = (start, 0);
-        let mut places = Vec::new();
+        let [mut column, mut row] = [start % self.width, start / self.width].map(|at| at as i64);
+        let mut places = Vec::with_capacity(SHORT);
         // Of what it surrounds, in cells; negative if that is on its left.
         let mut area = 0_i64;
         loop {
-            let row = (at / self.width) as i64;
             match direction {
                 0 => {
                     pass(at);
@@ -162,8 +167,12 @@ where
                 _ => {}
             }
             let beside = |by: [usize; 4]| at.wrapping_add(by[direction]);
-            places.push(self.crossing(beside(right_of), beside(left_of)));
+            let [right, down] = RIGHT[direction];
+            let inner = [column as f64 + right, row as f64 + down];
+            places.push(self.crossing([beside(right_of), beside(left_of)], [inner, WAYS[direction]]));
             at = at.wrapping_add(steps[direction]);
+            column += AHEAD[direction][0];
+            row += AHEAD[direction][1];
             let ahead = |by: [usize; 4]| (self.inside)(at.wrapping_add(by[direction]));
             direction = match (ahead(left_of), ahead(right_of)) {
                 // Cells that touch in a corner only are apart.
@@ -187,34 +196,49 @@ fn area(outline: &[Corner]) -> f64 {
 /// A closed line with fewer corners, none of the given ones further from it than its tolerance (Ramer, Douglas and Peucker).
 fn simplified(points: &[Place]) -> Vec<Corner> {
     let n = points.len();
-    // Two corners that are far apart stay.
+    // Two corners that are far apart stay: the last ones of those that are as far.
     let far = |from: Corner| {
-        let distance = |p: &Place| (p.at[0] - from[0]).powi(2) + (p.at[1] - from[1]).powi(2);
-        (0..n).max_by(|&i, &j| distance(&points[i]).total_cmp(&distance(&points[j]))).unwrap_or(0)
+        let mut farthest = (0, 0.0);
+        for (i, place) in points.iter().enumerate() {
+            let [x, y] = [place.at[0] - from[0], place.at[1] - from[1]];
+            let distance = x * x + y * y;
+            if distance >= farthest.1 {
+                farthest = (i, distance);
+            }
+        }
+        farthest.0
     };
     let a = far(points[0].at);
     let b = far(points[a].at);
     let (a, b) = (a.min(b), a.max(b));
     let mut kept = vec![false; n];
     (kept[a], kept[b]) = (true, true);
+    let weights: Vec<f64> = points.iter().map(|place| (place.tolerance * place.tolerance).recip()).collect();
     // Stretches of indices, which may go beyond the end.
     let mut stretches = vec![(a, b), (b, a + n)];
     while let Some((from, to)) = stretches.pop() {
         let (p, q) = (points[from % n].at, points[to % n].at);
         let (dx, dy) = (q[0] - p[0], q[1] - p[1]);
         let square = dx * dx + dy * dy;
-        // The square of the distance, in tolerances.
-        let offset = |place: &Place| {
-            let (ex, ey) = (place.at[0] - p[0], place.at[1] - p[1]);
-            let distance =
-                if square > 0.0 { (ex * dy - ey * dx).powi(2) / square } else { ex * ex + ey * ey };
-            distance / (place.tolerance * place.tolerance)
-        };
+        let by_square = square.recip();
         let mut worst = (from, 1.0);
-        for i in from + 1..to {
-            let off = offset(&points[if i < n { i } else { i - n }]);
-            if off > worst.1 {
-                worst = (i, off);
+        // Up to the end, and what goes beyond it.
+        let beyond = (from + 1).max(n) - n..to.max(n) - n;
+        for (first, range) in [(0, from + 1..to.min(n)), (n, beyond)] {
+            if range.is_empty() {
+                continue;
+            }
+            let start = first + range.start;
+            let places = points[range.clone()].iter().zip(&weights[range]);
+            for (i, (place, weight)) in (start..).zip(places) {
+                let (ex, ey) = (place.at[0] - p[0], place.at[1] - p[1]);
+                // The square of the distance, in tolerances.
+                let across = ex * dy - ey * dx;
+                let distance = if square > 0.0 { across * across * by_square } else { ex * ex + ey * ey };
+                let off = distance * weight;
+                if off > worst.1 {
+                    worst = (i, off);
+                }
             }
         }
         if worst.0 != from {
@@ -401,7 +425,7 @@ mod tests {
         let covered = |i: usize, part| if part == Part::Item || inside(i) { 1.0 } else { 0.0 };
         let mask = Mask { width: 5, inside, covered, shade: |i| Some(shade(i)), hidden: |_| None };
         // Between the second and the third column.
-        let [x, y] = mask.crossing(11, 12).at;
+        let [x, y] = mask.crossing([11, 12], [[1.0, 2.0], [1.0, 0.0]]).at;
         assert!((x - 2.2).abs() < 1e-9 && y == 2.5, "{x} {y}");
     }
 }

@@ -5,7 +5,7 @@ use rustc_hash::FxHashMap;
 use super::label::{Item, SHADES, Seen, Shade};
 use super::regions::{COVERED, NOTHING, Sample};
 use super::shading::Shading;
-use super::spans::Spans;
+use super::spans::{Spans, changes};
 use super::tones::Tones;
 use crate::raster::Pattern;
 use crate::raster::cells::{self, Given};
@@ -54,27 +54,30 @@ pub fn found(
     kinds.push(Kind::NONE);
     let kind = |label: u32| kinds[(label as usize).min(kinds.len() - 1)];
     let mut mark = |a: usize, b: usize| {
-        // Most neighbours are of one region.
         let [p, q] = [labels[a], labels[b]];
-        if p != q && kind(p.min(q)).is_apart(&kind(p.max(q))) {
+        if kind(p.min(q)).is_apart(&kind(p.max(q))) {
             (places[a], places[b]) = (1, 1);
         }
     };
     // The cells around the raster are empty, so the first of a row may be compared with the last of the row before.
     for cells in around.cells() {
-        for cell in cells.start.max(1)..cells.end {
-            mark(cell - 1, cell);
-        }
-        for cell in cells.start.max(width)..cells.end {
-            mark(cell - width, cell);
+        for before in [1, width] {
+            let cells = cells.start.max(before)..cells.end;
+            changes(labels, cells, before).for_each(|cell| mark(cell - before, cell));
         }
     }
     let mut chosen = Vec::new();
-    for cell in around.cells().flatten().filter(|cell| places[*cell] != 0) {
-        chosen.push(cell as u32);
-    }
-    for (number, cell) in (1..).zip(&chosen) {
-        places[*cell as usize] = number;
+    for cells in around.cells() {
+        let mut first = cells.start as u32;
+        for block in places[cells].chunks_mut(16) {
+            if block.iter().fold(0, |all, place| all | place) != 0 {
+                for (cell, place) in (first..).zip(block.iter_mut()).filter(|(_, place)| **place != 0) {
+                    chosen.push(cell);
+                    *place = chosen.len() as u32;
+                }
+            }
+            first += 16;
+        }
     }
     (places, chosen)
 }
@@ -125,7 +128,8 @@ impl AtEdges<'_> {
         if item >= COVERED || !has_shades {
             return Sample { item, step: 0 };
         }
-        let cell = [cell % self.seen.size[0], cell / self.seen.size[0]];
+        let (cell, width) = (cell as u32, self.seen.size[0] as u32);
+        let cell = [cell % width, cell / width].map(|at| at as usize);
         let step = items[n].item.map_or(0, |item| item.step(shading.strength(n, cell)));
         Sample { item: self.toned(n, &items[n], cell), step }
     }

@@ -3,7 +3,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::regions::NOTHING;
+use super::regions::{NO_SAMPLES, NOTHING};
 use super::spans::Spans;
 
 /// Rasters of more cells are not kept.
@@ -37,14 +37,18 @@ pub(crate) struct MarkMemory {
 }
 
 impl MarkMemory {
-    /// Room for marks on so many cells, and the last number that was used.
-    pub(super) fn begin(&mut self, cells: usize) -> u32 {
+    /// Room for marks on so many cells, if there is none yet on `most`, and the last number that was used.
+    pub(super) fn begin(&mut self, cells: usize, most: usize) -> u32 {
         if self.last > MOST_MARKS {
             self.on.iter_mut().for_each(|on| on.fill(0));
             self.last = 0;
         }
+        let room = if most > MOST_CELLS { cells } else { most.max(cells) };
         for on in self.on.iter_mut().filter(|on| on.len() < cells) {
-            *on = vec![0; cells];
+            *on = vec![0; room];
+        }
+        if self.first.len() < cells {
+            self.first = vec![NO_SAMPLES; room];
         }
         self.last
     }

@@ -139,8 +139,8 @@ pub(super) fn elements(
     let fineness = (is_fine, per_pixel);
     let (mut regions, shades) = label::label(seen, (&stems, &tones), fineness, most, &mut rasters);
     regions.with_narrow_parts();
-    regions.without_specks(per_pixel, &mut rasters.marks);
-    let outlines = regions.outlines(shades.len(), &mut rasters.marks);
+    regions.without_specks(per_pixel, &mut rasters.marks, most);
+    let outlines = regions.outlines(shades.len(), &mut rasters.marks, most);
     visible.labels = &regions.labels;
 
     let unit = cell * style.scale;

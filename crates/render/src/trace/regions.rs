@@ -179,11 +179,10 @@ impl Regions {
         Some(next.saturating_sub(1).clamp(first, last) as u32)
     }
 
-    /// The outlines of `count` regions, by number, in cells from the upper left corner.
-    pub fn outlines(&self, count: usize, memory: &mut MarkMemory) -> Vec<Vec<Vec<Corner>>> {
+    /// The outlines of `count` regions, by number, in cells from the upper left corner. Memory is for `most` cells, if there are no more.
+    pub fn outlines(&self, count: usize, memory: &mut MarkMemory, most: usize) -> Vec<Vec<Vec<Corner>>> {
         let cells = self.labels.len();
-        let mut number = memory.begin(cells);
-        memory.first.resize(cells.max(memory.first.len()), NO_SAMPLES);
+        let mut number = memory.begin(cells, most);
         let mut first = std::mem::take(&mut memory.first);
         let samples = Ranks::of(self, &mut first);
         let [inside, begun, seen] = memory.on.each_mut().map(|on| &mut on[..cells]);
@@ -386,7 +385,7 @@ pub(super) mod tests {
     fn a_region_reaches_under_those_that_come_later_and_has_no_holes_for_them() {
         let of =
             regions(&["0000000000", "0111111110", "0111111110", "0111221110", "0111111110", "0000000000"]);
-        let outlines = of.outlines(3, &mut MarkMemory::default());
+        let outlines = of.outlines(3, &mut MarkMemory::default(), 0);
         assert_eq!(outlines.iter().map(Vec::len).collect::<Vec<_>>(), [1, 1, 1], "{outlines:?}");
         let reach = |outline: &[Corner]| outline.iter().fold(0.0_f64, |reach, p| reach.max(p[0]));
         assert!(reach(&outlines[0][0]) > 10.0 && (reach(&outlines[1][0]) - 10.0).abs() < 0.6);
@@ -404,7 +403,7 @@ pub(super) mod tests {
             let item = of.labels[cell];
             of.samples.extend([item, item, NOTHING, NOTHING].map(|item| Sample { item, step: 0 }));
         }
-        let outlines = of.outlines(2, &mut MarkMemory::default());
+        let outlines = of.outlines(2, &mut MarkMemory::default(), 0);
         let reach = |upto: f64| {
             let within = outlines[0][0].iter().filter(|[_, y]| *y < upto);
             within.fold(0.0_f64, |reach, [x, _]| reach.max(*x))
@@ -416,8 +415,11 @@ pub(super) mod tests {
 
     #[test]
     fn what_comes_earlier_stays_open() {
-        let outlines =
-            regions(&["11111", "11011", "11011", "11011", "11111"]).outlines(2, &mut MarkMemory::default());
+        let outlines = regions(&["11111", "11011", "11011", "11011", "11111"]).outlines(
+            2,
+            &mut MarkMemory::default(),
+            0,
+        );
         assert_eq!(outlines[1].len(), 2, "an outline and its hole: {outlines:?}");
     }
 
@@ -425,8 +427,11 @@ pub(super) mod tests {
     fn a_hole_with_something_earlier_in_its_midst_stays_open() {
         let ring = |inner: &str| {
             let midst = format!("12222{inner}22221");
-            regions(&["11111111111", "12222222221", &midst, "12222222221", "11111111111"])
-                .outlines(3, &mut MarkMemory::default())
+            regions(&["11111111111", "12222222221", &midst, "12222222221", "11111111111"]).outlines(
+                3,
+                &mut MarkMemory::default(),
+                0,
+            )
         };
         assert_eq!((ring("2")[1].len(), ring("0")[1].len()), (1, 2));
     }
@@ -444,7 +449,7 @@ pub(super) mod tests {
         }
         of.with_narrow_parts();
         assert_eq!(of.labels[row + 2..row + 7], [1; 5]);
-        assert_eq!(of.outlines(2, &mut MarkMemory::default())[1].len(), 1);
+        assert_eq!(of.outlines(2, &mut MarkMemory::default(), 0)[1].len(), 1);
         // What is as wide as it has cells around is none.
         let mut wide = regions(&["1111111", "0000000", "0000000"]);
         (wide.per_cell, wide.places[row + 3], wide.edge_cells) = (4, 1, vec![row as u32 + 3]);

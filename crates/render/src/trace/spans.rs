@@ -42,9 +42,54 @@ impl Spans {
     }
 }
 
+/// Cells that are compared at once.
+const BLOCK: usize = 8;
+
+/// The cells of a range whose value differs from that of the cell so far before; most have neighbours of their own value.
+pub fn changes(values: &[u32], mut cells: Range<usize>, before: usize) -> impl Iterator<Item = usize> + '_ {
+    std::iter::from_fn(move || {
+        while !cells.is_empty() {
+            let cell = cells.start;
+            if cell + BLOCK <= cells.end && is_same(values, [cell - before, cell]) {
+                cells.start += BLOCK;
+                continue;
+            }
+            cells.start += 1;
+            if values[cell - before] != values[cell] {
+                return Some(cell);
+            }
+        }
+        None
+    })
+}
+
+/// Whether the blocks that begin with two cells have the same values.
+fn is_same(values: &[u32], firsts: [usize; 2]) -> bool {
+    let [a, b] = firsts.map(|first| values[first..].first_chunk::<BLOCK>());
+    let (Some(a), Some(b)) = (a, b) else { return false };
+    a.iter().zip(b).fold(0, |all, (a, b)| all | (a ^ b)) == 0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn changes_are_found_wherever_blocks_begin() {
+        let mut state = 3_u32;
+        let values: Vec<u32> = (0..400)
+            .map(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                u32::from(state >> 28 == 0)
+            })
+            .collect();
+        for (first, end, before) in [(1, 400, 1), (30, 399, 30), (17, 21, 2), (5, 5, 5)] {
+            let found: Vec<usize> = changes(&values, first..end, before).collect();
+            let expected: Vec<usize> = (first..end).filter(|i| values[*i] != values[i - before]).collect();
+            assert_eq!(found, expected);
+            assert!(expected.is_empty() || expected.len() > 1);
+        }
+    }
 
     #[test]
     fn cells_around_spans_are_within_the_raster() {

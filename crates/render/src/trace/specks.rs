@@ -13,16 +13,18 @@ const FAR_OFF: f64 = 0.2;
 impl Regions {
     /// Gives small pieces of regions that stand among others of their item to the neighbour that they border on most, if its light is about theirs,
     /// so that neither noise of shading nor the many shades of what is seen through a gap makes outlines. A narrow strip that runs aslant is one
-    /// piece: its cells touch in their corners. A pixel has so many cells.
-    pub fn without_specks(&mut self, per_pixel: f64, marks: &mut MarkMemory) {
+    /// piece: its cells touch in their corners. A pixel has so many cells. Memory
+    /// is for `cells`, if there are no more.
+    pub fn without_specks(&mut self, per_pixel: f64, marks: &mut MarkMemory, cells: usize) {
         let most = ((SPECK * per_pixel) as usize).clamp(1, MOST_SPECK);
         let mut piece = Vec::with_capacity(most);
         // The last piece that a cell was looked at for.
-        let mut number = marks.begin(self.labels.len());
+        let mut number = marks.begin(self.labels.len(), cells);
         let seen = &mut marks.on[0];
         let around = std::mem::take(&mut self.around);
         for cell in around.cells().flatten() {
-            if !self.is_first(cell) {
+            // In the midst of a row of a region, as most are.
+            if cell > 0 && self.labels[cell] == self.labels[cell - 1] || !self.is_first(cell) {
                 continue;
             }
             number += 1;
@@ -110,19 +112,19 @@ mod tests {
     fn a_narrow_strip_that_runs_aslant_is_one_region() {
         let of = || regions(&["0111", "2011", "2201", "2220"]);
         let mut cleaned = of();
-        cleaned.without_specks(1.0, &mut MarkMemory::default());
+        cleaned.without_specks(1.0, &mut MarkMemory::default(), 0);
         assert_eq!(cleaned.labels, of().labels);
-        assert_eq!(of().outlines(3, &mut MarkMemory::default())[0].len(), 1);
+        assert_eq!(of().outlines(3, &mut MarkMemory::default(), 0)[0].len(), 1);
     }
 
     #[test]
     fn a_cell_alone_goes_to_a_neighbour_of_its_item_only() {
         let mut of = regions(&["000", "010", "000"]);
         let middle = 2 * of.width + 2;
-        of.without_specks(1.0, &mut MarkMemory::default());
+        of.without_specks(1.0, &mut MarkMemory::default(), 0);
         assert_eq!(of.labels[middle], 1, "another item");
         of.items = vec![0; 10];
-        of.without_specks(1.0, &mut MarkMemory::default());
+        of.without_specks(1.0, &mut MarkMemory::default(), 0);
         assert_eq!(of.labels[middle], 0);
     }
 
@@ -135,7 +137,7 @@ mod tests {
             of.means[..3].copy_from_slice(&light);
             of.strengths =
                 of.labels.iter().map(|label| light.get(*label as usize).map_or(0.0, |x| *x as f32)).collect();
-            of.without_specks(1.0, &mut MarkMemory::default());
+            of.without_specks(1.0, &mut MarkMemory::default(), 0);
             of.labels[2 * of.width + 1..][..8].to_vec()
         };
         assert_eq!(cleaned("00111000"), [0; 8]);
