@@ -42,8 +42,10 @@ proptest! {
     }
 }
 
-/// Rates that depend on the whole part f of y, as they are written and as numbers.
-const OF_WHOLE_PARTS: [(&str, fn(f64) -> f64); 9] = [
+/// A rate that depends on the whole part of y, as it is written and as a number.
+type Rate = (&'static str, fn(f64) -> f64);
+
+const OF_WHOLE_PARTS: [Rate; 9] = [
     ("if floor(y) - 2*floor(y/2) = 0 then 2 else 1", |f| 2.0 - f.rem_euclid(2.0)),
     ("if floor(y) > 2*floor(y/2) then 1 else 2", |f| 2.0 - f.rem_euclid(2.0)),
     ("match floor(y) - 4*floor(y/4) case 0: 2 case 1: 1.5 case 2: 0.3 else 1", |f| {
