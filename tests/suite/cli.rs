@@ -205,6 +205,22 @@ fn a_model_that_fails_later_leaves_no_frames() {
     assert_eq!((status, out.exists()), (1, false));
 }
 
+#[test]
+fn a_floor_that_hides_the_sky_says_so() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let path = folder.path().join("a.dls");
+    std::fs::write(&path, "ground 0\nsky \"#6fa3e0\", \"#e8f0f8\"\naxiom: F\n").expect("written");
+    let path = path.to_str().expect("UTF-8");
+    let out = folder.path().join("a.png");
+    let says = |flags: &[&str]| {
+        let line =
+            ["render", path, "--at", "0", "--width", "40", "--force", "-o", out.to_str().expect("UTF-8")];
+        String::from_utf8_lossy(&dlsys(&[&line, flags].concat()).stderr).contains("the floor hides the sky")
+    };
+    assert!(says(&["--view", "20,15"]));
+    assert!(!says(&[]) && !says(&["--view", "20,15", "--perspective", "40"]) && !says(&["--view", "20,-5"]));
+}
+
 /// Sheets are not seen from the camera of a model, which is said unless another direction is chosen.
 #[test]
 fn a_sheet_says_that_it_does_not_use_the_camera() {

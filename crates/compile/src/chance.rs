@@ -350,7 +350,10 @@ impl RuleBuilder<'_> {
         if let Some(guard) = hazard.guard {
             fault = self.scope.graph.binary(Binary::And, guard, fault);
         }
-        let guard = self.decompose(fault, hazard.span, atoms)?;
+        atoms.of_productions = true;
+        let guard = self.decompose(fault, hazard.span, atoms);
+        atoms.of_productions = false;
+        let guard = guard?;
         Some(Produce { guard, span: clause, key: 0, is_fault: true, outcome: Outcome::default() })
     }
 }

@@ -192,6 +192,7 @@ impl RuleBuilder<'_> {
                 continue;
             };
             let node = self.scope.condition(&self.document.expressions, guard, &frame.variables);
+            atoms.of_productions = matches!(clause.action, ast::Action::Produce(_));
             let condition = match (node, &clause.hazard) {
                 // The clock determines the time of an event at a rate.
                 (Some(_), Some(_)) => Some(Condition::default()),
@@ -200,6 +201,7 @@ impl RuleBuilder<'_> {
             *good &= condition.is_some();
             guards.push(Guard { condition: condition.unwrap_or_default(), node });
         }
+        atoms.of_productions = false;
         guards
     }
 

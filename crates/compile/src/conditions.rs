@@ -38,7 +38,10 @@ pub struct Atoms {
     steady: Vec<u32>,
     /// The variable of the first aggregate.
     first_aggregate: u32,
-    index: HashMap<(NodeId, NodeId), u32>,
+    /// What is decomposed is the condition of a production. Productions take place behind a jump, and equations change at it, so a comparison of what
+    /// jumps that both ask for is two atoms.
+    pub of_productions: bool,
+    index: HashMap<(NodeId, NodeId, bool), u32>,
 }
 
 impl RuleBuilder<'_> {
@@ -85,7 +88,9 @@ impl RuleBuilder<'_> {
                         continue;
                     }
                     // What is left of it may jump itself.
-                    let jumps = jumps && !comparisons::has_steps(&self.scope.graph, &[a, b], &moves);
+                    let has_steps = (jumps || atoms.of_productions)
+                        && comparisons::has_steps(&self.scope.graph, &[a, b], &moves);
+                    let jumps = jumps && !has_steps;
                     let comparison = match op {
                         Binary::Lt => Comparison::Less,
                         Binary::Le => Comparison::LessOrEqual,
@@ -104,7 +109,8 @@ impl RuleBuilder<'_> {
                                 .help(advice::not_finite(f64::NAN)),
                         );
                     }
-                    steps.push(atoms.step((a, b), comparison, jumps, at, boundary));
+                    let apart = atoms.of_productions && has_steps;
+                    steps.push(atoms.step((a, b, apart), comparison, jumps, at, boundary));
                 }
                 node => unreachable!("{node:?} is no condition"),
             }
@@ -145,17 +151,17 @@ impl Atoms {
         Atoms { steady, first_aggregate, ..Atoms::default() }
     }
 
-    /// The step that compares two sides; each pair is stored once, in either order.
+    /// The step that compares two sides; each pair is stored once, in either order, and once more `apart` from the others.
     fn step(
         &mut self,
-        (a, b): (NodeId, NodeId),
+        (a, b, apart): (NodeId, NodeId, bool),
         comparison: Comparison,
         jumps: bool,
         span: Span,
         sides: Option<&Sides>,
     ) -> ConditionStep {
         let (pair, comparison) = if a <= b { ((a, b), comparison) } else { ((b, a), comparison.mirrored()) };
-        let atom = *self.index.entry(pair).or_insert_with(|| {
+        let atom = *self.index.entry((pair.0, pair.1, apart)).or_insert_with(|| {
             self.sides.push(pair);
             self.spans.push(span);
             let known = sides.map(|Sides { written: [left, right], turned }| {

@@ -5,7 +5,7 @@
 //! Elsewhere the difference is bounded by interval arithmetic and its roots are isolated ([`CrossingDetector::root`]),
 //! unless the bounds over the whole path already exclude a change of sign.
 
-use crate::detect::signs::{Reach, is_at, opposite, rate_at, reach, sign_of};
+use crate::detect::signs::{NEAR, Reach, is_at, opposite, rate_at, reach, sign_of};
 use crate::world::coupled_solution::DenseComponent;
 use crate::world::path::Path;
 use crate::world::state::State;
@@ -270,8 +270,13 @@ impl CrossingDetector {
                 from = behind;
             } else if Sign::of(start) != sign {
                 let then = self.difference(path, atom).value(behind);
+                let has_jumped = then == start || start.abs() > NEAR * self.out[2 * atom].abs().max(1.0);
                 if Sign::of(then) == sign {
                     (from, start) = (behind, then);
+                } else if sign != Sign::Zero && Sign::of(then) == Sign::of(start) && has_jumped {
+                    // Another event of the module came a rounding before the jump, and its numbers are those behind it.
+                    let (time, now) = (path.start.after(from * path.h), Sign::of(start));
+                    return Some(Crossing { position: from, time, at: now, after: now, level: None });
                 }
             }
         }
