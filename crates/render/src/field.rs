@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use super::draft::{self, Draft};
 use super::lens::Lens;
-use super::raster::cells::{self, Given, Nearest};
+use super::raster::cells::{self, Given, Middles};
 use super::raster::{self, Place};
 use super::shot;
 use super::stage::{Part, Stage};
@@ -215,14 +215,14 @@ fn count(scene: &Scene, place: &Placement, accuracy: &dyn Fn(Point) -> f64) -> u
 struct Front {
     lens: Lens,
     /// By cell; greater ones are nearer.
-    nearest: Nearest<1>,
+    nearest: Middles,
 }
 
 impl Front {
     /// Of nothing.
     fn new(lens: Lens) -> Front {
         let cells = lens.size[0] * lens.size[1];
-        let nearest = Nearest { numbers: vec![[0]; cells], depths: vec![[f32::NEG_INFINITY]; cells] };
+        let nearest = Middles { numbers: vec![0; cells], depths: vec![f32::NEG_INFINITY; cells] };
         Front { lens, nearest }
     }
 
@@ -243,7 +243,7 @@ impl Front {
     /// Adds triangles that hide what is behind.
     fn hide_behind(&mut self, places: &[[Place; 3]]) {
         let triangles = Given { count: places.len(), corners: |n: usize| places[n], cut: |_| None };
-        let nothing = Nearest { numbers: Vec::new(), depths: Vec::new() };
+        let nothing = Middles { numbers: Vec::new(), depths: Vec::new() };
         let nearest = std::mem::replace(&mut self.nearest, nothing);
         self.nearest = cells::in_middles(self.lens.size, &triangles, nearest).0;
     }
@@ -270,7 +270,7 @@ impl Front {
         range(places.map(|place| place.y), height).any(|row| {
             let line = row * width;
             let depths = &self.nearest.depths[line + columns.start..line + columns.end];
-            depths.iter().any(|[depth]| *depth <= near)
+            depths.iter().any(|depth| *depth <= near)
         })
     }
 }
@@ -450,7 +450,7 @@ mod tests {
         let places: Vec<[Place; 3]> =
             kept.faces.iter().map(|face| seen.places(face, &kept.vertices)).collect();
         seen.hide_behind(&places);
-        assert!(all.nearest.depths.iter().any(|[depth]| depth.is_finite()));
+        assert!(all.nearest.depths.iter().any(|depth| depth.is_finite()));
         assert!(all.nearest.depths == seen.nearest.depths);
         // Whatever the number of threads.
         let other = field.small(3).expect("room").expect("small plants");

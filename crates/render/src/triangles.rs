@@ -431,6 +431,15 @@ impl Triangles {
         }
     }
 
+    /// Leaves out the far sides of stems and of ground: these are closed, so nothing of them is seen. Vertices are given as the camera sees them.
+    pub(super) fn without_far_sides(&mut self, seen: &[Point]) {
+        self.faces.retain(|face| {
+            let [p, q, r] = face.corners.map(|(vertex, _)| seen[vertex as usize]);
+            let is_far = (q.x - p.x) * (r.y - p.y) <= (q.y - p.y) * (r.x - p.x);
+            face.is_thin || !is_far
+        });
+    }
+
     /// Everything in a solid, in string order; stems, by number, only if they are to be `kept`.
     pub(super) fn of(solid: &Solid, kept: impl Fn(usize) -> bool) -> Triangles {
         let [vertices, normals] = solid.counts.map(|count| count as usize);
@@ -452,5 +461,29 @@ impl Triangles {
             mesh.segments.push(segment.map(|segment| segment as u32));
         });
         mesh
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn far_sides_of_what_is_closed_are_left_out() {
+        let mut mesh = Triangles::with_capacity(3, 1, 4);
+        for [x, y] in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]] {
+            mesh.vertex(|| Point::new(x, y, 0.0));
+        }
+        mesh.normal(Vector::z);
+        for is_thin in [false, true] {
+            mesh.is_thin = is_thin;
+            mesh.face([(0, 0), (1, 0), (2, 0)]);
+            mesh.face([(0, 0), (2, 0), (1, 0)]);
+        }
+        let seen = mesh.vertices.clone();
+        mesh.without_far_sides(&seen);
+        let kept: Vec<(bool, u32)> =
+            mesh.faces.iter().map(|face| (face.is_thin, face.corners[1].0)).collect();
+        assert_eq!(kept, [(false, 1), (true, 1), (true, 2)]);
     }
 }

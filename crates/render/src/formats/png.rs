@@ -94,17 +94,16 @@ pub(crate) struct Lit<'m> {
 }
 
 impl<'m> Lit<'m> {
-    /// The triangles of a scene in this light, whose floor has a material of its own. A point that the camera sees at x, y is at `a x + b` and
-    /// `c - a y` pixels.
+    /// The triangles of a scene in this light, whose floor has a material of its own, and their vertices as the camera sees them. A point that it sees
+    /// at x, y is at `a x + b` and `c - a y` pixels.
     pub(crate) fn new(
         scene: &'m Scene,
-        mesh: &'m Triangles,
+        (mesh, seen): (&'m Triangles, Vec<Point>),
         (fit, lighting): (&'m Fit, Lighting<'m>),
         [a, b, c]: [f64; 3],
         floor: Option<MaterialId>,
     ) -> Lit<'m> {
         let scale = if fit.extent > 0.0 { 1.0 / fit.extent } else { 1.0 };
-        let seen: Vec<Point> = mesh.vertices.iter().map(|p| fit.camera.project(*p)).collect();
         let places = seen.iter().map(|p| [a * p.x + b, c - a * p.y, p.z]).collect();
         let normals = mesh.normals.iter().map(|&n| fit.camera.direction(n)).collect();
         Lit {

@@ -27,6 +27,12 @@ pub(crate) struct Nearest<const N: usize> {
     pub(crate) depths: Vec<[f32; N]>,
 }
 
+/// The nearest triangles in the middles of all pixels of a raster, row by row: the number of each plus 1, or 0, and its depth.
+pub(crate) struct Middles {
+    pub(crate) numbers: Vec<u32>,
+    pub(crate) depths: Vec<f32>,
+}
+
 /// A number of triangles, the corners of each, and what is cut out of it.
 pub(crate) struct Given<C, D> {
     pub(crate) count: usize,
@@ -39,8 +45,8 @@ pub(crate) struct Given<C, D> {
 pub(crate) fn in_middles<'c>(
     [width, height]: [usize; 2],
     triangles: &Given<impl Fn(usize) -> [Place; 3], impl Fn(usize) -> Option<Cut<'c>>>,
-    mut nearest: Nearest<1>,
-) -> (Nearest<1>, Vec<[u32; 2]>) {
+    mut nearest: Middles,
+) -> (Middles, Vec<[u32; 2]>) {
     let mut spans = vec![[u32::MAX, 0]; height];
     let mut hidden = Hidden::of(width);
     for number in 0..triangles.count {
@@ -81,7 +87,7 @@ fn is_small(corners: &[Place; 3]) -> bool {
     within(corners.map(|corner| corner.x)) && within(corners.map(|corner| corner.y))
 }
 
-impl Nearest<1> {
+impl Middles {
     /// Adds a small triangle, four pixels at a time.
     #[inline(always)]
     fn add_small(
@@ -113,8 +119,8 @@ impl Nearest<1> {
             let (depth, slope) = plane.along([first, row]);
             let along = f32x4::splat(slope) * f32x4::new([0.0, 1.0, 2.0, 3.0]);
             let cells = row * width + first..row * width + first + count;
-            let held = self.numbers.as_flattened_mut()[cells.clone()].as_chunks_mut::<LANES>().0;
-            let behind = self.depths.as_flattened_mut()[cells].as_chunks_mut::<LANES>().0;
+            let held = self.numbers[cells.clone()].as_chunks_mut::<LANES>().0;
+            let behind = self.depths[cells].as_chunks_mut::<LANES>().0;
             let mut depth = f32x4::splat(depth);
             for (held, behind) in held.iter_mut().zip(behind) {
                 let [p, q, r] = here;
@@ -171,7 +177,7 @@ impl Nearest<1> {
                 if greatest + EQUAL >= hidden.least(block, row) {
                     let cells = row * width + from..row * width + to;
                     let held = self.numbers[cells.clone()].iter_mut();
-                    for (column, ([held], [behind])) in (from..to).zip(held.zip(&mut self.depths[cells])) {
+                    for (column, (held, behind)) in (from..to).zip(held.zip(&mut self.depths[cells])) {
                         let depth = depth(column);
                         // Later ones have greater numbers.
                         if depth + EQUAL >= *behind
@@ -232,7 +238,7 @@ impl Hidden {
     }
 
     /// Takes note of the depths of a block. They only grow.
-    fn look(&mut self, block: usize, row: usize, depths: &[[f32; 1]]) {
+    fn look(&mut self, block: usize, row: usize, depths: &[f32]) {
         let from = row * self.width + block * BLOCK;
         let depths = depths[from..from + self.size(block)].iter();
         let index = self.index(block, row);
@@ -241,7 +247,7 @@ impl Hidden {
             self.least.resize(blocks, f32::NEG_INFINITY);
         }
         self.least[index] =
-            depths.fold(f32::INFINITY, |least, [depth]| if *depth < least { *depth } else { least });
+            depths.fold(f32::INFINITY, |least, depth| if *depth < least { *depth } else { least });
     }
 }
 
@@ -268,10 +274,8 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64 * most
         };
-        let empty = || Nearest {
-            numbers: vec![[0]; width * height],
-            depths: vec![[f32::NEG_INFINITY]; width * height],
-        };
+        let empty =
+            || Middles { numbers: vec![0; width * height], depths: vec![f32::NEG_INFINITY; width * height] };
         for round in 0..100 {
             let triangles: Vec<[Place; 3]> = (0..60)
                 .map(|_| {
@@ -297,7 +301,7 @@ mod tests {
             for (row, [first, end]) in spans.iter().enumerate() {
                 let line = &found.numbers[row * width..][..width];
                 let is_within = |column: usize| (*first as usize..*end as usize).contains(&column);
-                assert!((0..width).all(|column| line[column] == [0] || is_within(column)), "round {round}");
+                assert!((0..width).all(|column| line[column] == 0 || is_within(column)), "round {round}");
             }
         }
     }
@@ -320,10 +324,8 @@ mod tests {
                 })
             })
             .collect();
-        let empty = || Nearest {
-            numbers: vec![[0]; width * height],
-            depths: vec![[f32::NEG_INFINITY]; width * height],
-        };
+        let empty =
+            || Middles { numbers: vec![0; width * height], depths: vec![f32::NEG_INFINITY; width * height] };
         let given = Given { count: triangles.len(), corners: |n: usize| triangles[n], cut: |_| None };
         let (found, spans) = in_middles([width, height], &given, empty());
         // Nothing is known to be hidden if each begins anew.
@@ -340,15 +342,15 @@ mod tests {
                     ready.sides.iter().all(|[value, a, b]| value + a * ahead[0] + b * ahead[1] >= 0)
                 };
                 let columns = (0..width).filter(|column| at(*column));
-                let held = |column: &usize| plain.numbers[row * width + column] >= [number];
+                let held = |column: &usize| plain.numbers[row * width + column] >= number;
                 let covered = columns.filter(|column| !held(column));
-                let depths = |column: usize| plain.depths[row * width + column][0];
+                let depths = |column: usize| plain.depths[row * width + column];
                 assert!(covered.into_iter().all(|column| depths(column) > f32::NEG_INFINITY), "{number}");
             }
         }
         assert!(found.numbers == plain.numbers && found.depths == plain.depths);
         assert!(spans.iter().zip(&rows).all(|(a, b)| a == b || b[0] == u32::MAX));
-        let seen: std::collections::HashSet<u32> = found.numbers.iter().map(|[number]| *number).collect();
+        let seen: std::collections::HashSet<u32> = found.numbers.iter().copied().collect();
         assert!((10..250).contains(&seen.len()), "{}", seen.len());
     }
 }

@@ -19,19 +19,19 @@ const BITS: i32x4 = i32x4::new([1, 2, 4, 8]);
 /// The first column of a block.
 const COLUMN: u64 = 0x0101_0101_0101_0101;
 
-/// Finds the nearest triangle at each sample of these pixels; `places` has the number of each among them, from 1 on, and 0 for others. Of two at the same
+/// Finds the nearest triangle at each sample of these pixels; `place` gives the number of each among them. Of two at the same
 /// depth it is the later. Triangles that are known to be `seen` come first, so that most others are hidden by then.
 pub(crate) fn at_samples<'c, const N: usize>(
     pattern: &Pattern<N>,
     size: [usize; 2],
     triangles: &Given<impl Fn(usize) -> [Place; 3], impl Fn(usize) -> Option<Cut<'c>>>,
-    (pixels, places): (&[u32], &[u32]),
+    (pixels, place): (&[u32], impl Fn(usize) -> usize),
     seen: impl Fn(usize) -> bool,
 ) -> Nearest<N> {
     let count = pixels.len();
     let mut nearest = Nearest { numbers: vec![[0; N]; count], depths: vec![[f32::NEG_INFINITY; N]; count] };
     let Given { corners, cut, .. } = triangles;
-    let area = Area { samples: &fragments::places(pattern), places, size };
+    let area = Area { samples: &fragments::places(pattern), place, size };
     let blocks = Blocks::new(size, pixels, |_| f32::NEG_INFINITY);
     for number in (0..triangles.count).filter(|number| seen(*number)) {
         nearest.add(&area, &blocks, (number, corners(number), || cut(number)), |_, _| true);
@@ -87,10 +87,10 @@ fn within(block: usize, [first, last]: [usize; 2], apart: u32) -> u64 {
 }
 
 /// Where there are samples.
-struct Area<'a, const N: usize> {
+struct Area<'a, const N: usize, P> {
     samples: &'a Places<N>,
-    /// By pixel: its place, from 1 on, or 0.
-    places: &'a [u32],
+    /// Of a pixel that has samples: its place among those.
+    place: P,
     size: [usize; 2],
 }
 
@@ -136,7 +136,7 @@ impl<const N: usize> Nearest<N> {
     /// Adds a triangle where it is in front. `is_open` tells whether something at this depth may be seen at a place.
     fn add<'c>(
         &mut self,
-        area: &Area<N>,
+        area: &Area<N, impl Fn(usize) -> usize>,
         blocks: &Blocks,
         (number, corners, cut): (usize, [Place; 3], impl FnOnce() -> Option<Cut<'c>>),
         is_open: impl Fn(usize, f32) -> bool,
@@ -161,7 +161,7 @@ impl<const N: usize> Nearest<N> {
                     let bit = pixels.trailing_zeros() as usize;
                     pixels &= pixels - 1;
                     let pixel = [first[0] + bit % BLOCK, first[1] + bit / BLOCK];
-                    let place = area.places[pixel[1] * width + pixel[0]] as usize - 1;
+                    let place = (area.place)(pixel[1] * width + pixel[0]);
                     if !is_open(place, front) {
                         continue;
                     }
@@ -171,21 +171,21 @@ impl<const N: usize> Nearest<N> {
                         drawn = ready.map(|ready| Drawn::new(number as u32 + 1, ready, cut, area.samples));
                     }
                     let Some(drawn) = &drawn else { return };
-                    self.add_at(place, area, drawn, pixel);
+                    self.add_at(place, area.samples, drawn, pixel);
                 }
             }
         }
     }
 
     /// Adds a triangle in a pixel.
-    fn add_at(&mut self, place: usize, area: &Area<N>, drawn: &Drawn<N>, pixel: [usize; 2]) {
-        let [xs, ys] = area.samples;
+    fn add_at(&mut self, place: usize, samples: &Places<N>, drawn: &Drawn<N>, pixel: [usize; 2]) {
+        let [xs, ys] = samples;
         let here = drawn.at(pixel);
         if drawn.is_outside(here, 1) {
             return;
         }
         let covered = drawn.cover.mask(here);
-        let mask = drawn.cut.as_ref().map_or(covered, |cut| left_of(cut, covered, pixel, area.samples));
+        let mask = drawn.cut.as_ref().map_or(covered, |cut| left_of(cut, covered, pixel, samples));
         if mask == 0 {
             return;
         }

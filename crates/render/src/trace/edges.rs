@@ -2,6 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
+use super::cell_set::CellSet;
 use super::label::{Item, SHADES, Seen, Shade};
 use super::regions::{COVERED, NOTHING, Sample};
 use super::shading::Shading;
@@ -41,22 +42,16 @@ impl Kind {
     }
 }
 
-/// By cell its number, from 1 on, among those beside one of another item, or of a shade that is not the next one, else 0; and these cells. All that is
-/// labelled is well within the spans.
-pub fn found(
-    labels: &[u32],
-    items: &[u32],
-    shades: &[Shade],
-    (width, around): (usize, &Spans),
-    mut places: Vec<u32>,
-) -> (Vec<u32>, Vec<u32>) {
+/// The cells beside one of another item, or of a shade that is not the next one. All that is labelled is well within the spans.
+pub fn found(labels: &[u32], items: &[u32], shades: &[Shade], (width, around): (usize, &Spans)) -> CellSet {
     let mut kinds: Vec<Kind> = shades.iter().zip(items).map(|(shade, item)| Kind::of(shade, *item)).collect();
     kinds.push(Kind::NONE);
     let kind = |label: u32| kinds[(label as usize).min(kinds.len() - 1)];
+    let mut found = CellSet::new(labels.len());
     let mut mark = |a: usize, b: usize| {
         let [p, q] = [labels[a], labels[b]];
         if kind(p.min(q)).is_apart(&kind(p.max(q))) {
-            (places[a], places[b]) = (1, 1);
+            [a, b].into_iter().for_each(|cell| found.insert(cell));
         }
     };
     // The cells around the raster are empty, so the first of a row may be compared with the last of the row before.
@@ -66,27 +61,16 @@ pub fn found(
             changes(labels, cells, before).for_each(|cell| mark(cell - before, cell));
         }
     }
-    let mut chosen = Vec::new();
-    for cells in around.cells() {
-        let mut first = cells.start as u32;
-        for block in places[cells].chunks_mut(16) {
-            if block.iter().fold(0, |all, place| all | place) != 0 {
-                for (cell, place) in (first..).zip(block.iter_mut()).filter(|(_, place)| **place != 0) {
-                    chosen.push(cell);
-                    *place = chosen.len() as u32;
-                }
-            }
-            first += 16;
-        }
-    }
-    (places, chosen)
+    found.number(around.cells());
+    found
 }
 
-/// The cells at edges: those that have a place, from 1 on, in their order.
+/// The cells at edges.
 pub struct AtEdges<'a> {
     pub seen: Seen<'a>,
-    pub places: &'a [u32],
-    pub cells: &'a [u32],
+    /// By triangle: whether it is the nearest in the middle of any cell.
+    pub in_front: &'a [bool],
+    pub cells: &'a CellSet,
     pub tones: &'a Tones,
     pub of_item: &'a FxHashMap<Item, u32>,
 }
@@ -99,15 +83,15 @@ impl AtEdges<'_> {
         items: &[FaceItem],
         shading: &mut Shading,
     ) -> Vec<Sample> {
-        let Seen { lit, numbers, size, spans, .. } = self.seen;
-        let mut in_front = vec![false; items.len() + 1];
-        let middles = spans.cells().flat_map(|cells| &numbers[cells]);
-        middles.for_each(|[number]| in_front[*number as usize] = true);
+        let Seen { lit, size, .. } = self.seen;
+        let (cells, in_front) = (self.cells.cells(), self.in_front);
         let triangles = Given { count: items.len(), corners: |n| lit.snapped(n), cut: |n| lit.cut(n, N) };
-        let seen = at_samples(pattern, size, &triangles, (self.cells, self.places), |n| in_front[n + 1]);
-        let mut samples = Vec::with_capacity(self.cells.len() * N);
+        // Each has a place.
+        let place = |cell: usize| self.cells.place(cell).unwrap_or_default();
+        let seen = at_samples(pattern, size, &triangles, (cells, place), |n| in_front[n]);
+        let mut samples = Vec::with_capacity(cells.len() * N);
         let mut known: Vec<(u32, Sample)> = Vec::with_capacity(N);
-        for (cell, numbers) in self.cells.iter().zip(&seen.numbers) {
+        for (cell, numbers) in cells.iter().zip(&seen.numbers) {
             known.clear();
             samples.extend(numbers.map(|number| match known.iter().find(|known| known.0 == number) {
                 Some(&(_, sample)) => sample,

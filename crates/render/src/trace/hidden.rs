@@ -28,7 +28,7 @@ const MOST_HIDDEN: f64 = 0.06;
 /// The depths of what hides stems, by cell; and where the camera's x, y are: at `a x + b` and `c - a y` cells.
 pub struct Visible<'a> {
     pub style: Style<'a>,
-    pub depths: &'a [[f32; 1]],
+    pub depths: &'a [f32],
     /// The regions of cells, if they are known.
     pub labels: &'a [u32],
     pub size: [usize; 2],
@@ -192,7 +192,7 @@ impl Visible<'_> {
 
     /// Whether nothing hides what is at this depth, in parts of the extent, at a place of the raster.
     fn is_seen(&self, place: [f64; 2], depth: f64) -> bool {
-        self.cell(place).is_none_or(|cell| (depth + NEARER) as f32 >= self.depths[cell][0])
+        self.cell(place).is_none_or(|cell| (depth + NEARER) as f32 >= self.depths[cell])
     }
 
     /// How much nearer than the axis the side of a stem is in front of it, at one of its ends.

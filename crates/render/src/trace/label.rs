@@ -13,7 +13,7 @@ use super::spans::Spans;
 use super::tones::{MOST, Tones};
 use crate::formats::png::Lit;
 use crate::raster::SIXTEEN;
-use crate::raster::cells::{self, Given, Nearest};
+use crate::raster::cells::{self, Given, Middles};
 use crate::raster::samples::EIGHT;
 use crate::triangles::{Triangle, Triangles};
 use dlsys_geometry::scene::{MaterialId, OwnerId};
@@ -22,7 +22,7 @@ use dlsys_geometry::scene::{MaterialId, OwnerId};
 pub const SHADES: u8 = 20;
 const FINE_SHADES: u8 = 60;
 /// No step is below this.
-const DARKEST: i32 = -256;
+pub const DARKEST: i32 = -256;
 /// What covers so many pixels is large.
 const LARGE: f64 = 10_000.0;
 /// Of so many rows and columns one each is looked at to tell what is large, and what is less wide than so many of those is not: in gaps between
@@ -116,12 +116,11 @@ impl Stems {
 pub struct Seen<'a> {
     pub mesh: &'a Triangles,
     pub lit: &'a Lit<'a>,
-    /// The number of the nearest triangle plus 1, or 0.
-    pub numbers: &'a [[u32; 1]],
     pub size: [usize; 2],
-    /// Where there are triangles, and that with the cells around.
+    /// Where there are triangles, that with the cells around, and that with the cells around it.
     pub spans: &'a Spans,
     pub around: &'a Spans,
+    pub beyond: &'a Spans,
 }
 
 /// The number of the nearest triangle in the middle of each cell plus 1, or 0, and its depth; and where there are triangles. Memory is for `most`
@@ -131,31 +130,32 @@ pub fn nearest(
     lit: &Lit,
     (size, most): ([usize; 2], usize),
     rasters: &mut Rasters,
-) -> (Nearest<1>, Spans) {
+) -> (Middles, Spans) {
     let room = [size[0] * size[1], most];
-    let numbers = empty(&mut rasters.numbers, room, [0]);
-    let nothing = Nearest { numbers, depths: empty(&mut rasters.depths, room, [f32::NEG_INFINITY]) };
+    let numbers = empty(&mut rasters.numbers, room, 0);
+    let nothing = Middles { numbers, depths: empty(&mut rasters.depths, room, f32::NEG_INFINITY) };
     let triangles = Given { count: mesh.faces.len(), corners: |n| lit.snapped(n), cut: |n| lit.cut(n, 1) };
     let (nearest, rows) = cells::in_middles(size, &triangles, nothing);
     (nearest, Spans::new(size[0], rows))
 }
 
-/// The raster of regions, and their shades by number. Regions are painted in the order of modules, materials and shades.
+/// The raster of regions, in place of one of triangles, and their shades by number. Regions are painted in the order of modules, materials and shades.
 /// A pixel of the page is so many cells; of cells finer than pixels edges have fewer samples.
 pub fn label(
-    seen: Seen,
+    (numbers, seen): (Vec<u32>, Seen),
     (stems, tones): (&Stems, &Tones),
     (is_fine, per_pixel): (bool, f64),
     most: usize,
     rasters: &mut Rasters,
 ) -> (Regions, Vec<Shade>) {
-    let Seen { mesh, numbers, around, size: [width, _], .. } = seen;
+    let Seen { mesh, around, size: [width, _], .. } = seen;
     let room = [numbers.len(), most];
     let mut item_of = items_of(mesh, stems);
-    shade_finely(mesh, &mut item_of, numbers, seen.spans, (per_pixel * LARGE) as usize);
+    shade_finely(mesh, &mut item_of, &numbers, seen.spans, (per_pixel * LARGE) as usize);
     let mut shading = Shading::new(seen.lit);
     let mut cells = Cells {
-        labels: empty(&mut rasters.labels, room, NOTHING),
+        labels: numbers,
+        in_front: vec![false; mesh.faces.len()],
         strengths: empty(&mut rasters.strengths, room, 0.0),
         shades: Vec::new(),
         items: FxHashMap::default(),
@@ -163,8 +163,8 @@ pub fn label(
         tables: Vec::new(),
     };
     cells.fill(seen, &item_of, tones, &mut shading);
-    let Cells { mut labels, strengths, mut shades, .. } = cells;
-    clear_rim(&mut labels, width);
+    let Cells { mut labels, in_front, strengths, mut shades, .. } = cells;
+    clear_rim(&mut labels, width, seen.beyond);
     let mut order: Vec<u32> = (0..shades.len() as u32).collect();
     order.sort_by_key(|number| shades[*number as usize].key());
     shades.sort_by_key(Shade::key);
@@ -177,9 +177,8 @@ pub fn label(
     }
 
     let (items, of_item) = items(&shades);
-    let nothing = empty(&mut rasters.places, room, 0);
-    let (places, edge_cells) = edges::found(&labels, &items, &shades, (width, around), nothing);
-    let at_edges = AtEdges { seen, places: &places, cells: &edge_cells, tones, of_item: &of_item };
+    let edges = edges::found(&labels, &items, &shades, (width, around));
+    let at_edges = AtEdges { seen, in_front: &in_front, cells: &edges, tones, of_item: &of_item };
     let face_items = face_items(&item_of, &of_item);
     let samples = match is_fine {
         true => at_edges.samples(&EIGHT, &face_items, &mut shading),
@@ -191,20 +190,8 @@ pub fn label(
     let steps = shades.iter().map(|shade| shade.step).collect();
     let means = shades.iter().map(Shade::strength).collect();
     let around = around.clone();
-    let regions = Regions {
-        width,
-        around,
-        labels,
-        places,
-        edge_cells,
-        samples,
-        per_cell,
-        items,
-        steps,
-        strengths,
-        least,
-        means,
-    };
+    let regions =
+        Regions { width, around, labels, edges, samples, per_cell, items, steps, strengths, least, means };
     (regions, shades)
 }
 
@@ -221,7 +208,10 @@ fn items_of(mesh: &Triangles, stems: &Stems) -> Vec<Option<Item>> {
 
 /// Cells as they are given their regions, which are numbered as they are found.
 struct Cells {
+    /// First the number of the nearest triangle plus 1, or 0; then the region.
     labels: Vec<u32>,
+    /// By triangle: whether it is the nearest in any cell.
+    in_front: Vec<bool>,
     strengths: Vec<f32>,
     shades: Vec<Shade>,
     /// By item: the number of its table, and of the last item; a table has the number of each shade from the darkest on, plus 1, or 0.
@@ -233,18 +223,24 @@ struct Cells {
 impl Cells {
     fn fill(&mut self, seen: Seen, items: &[Option<Item>], tones: &Tones, shading: &mut Shading) {
         let width = seen.size[0];
-        for cells in seen.spans.cells() {
+        for cells in seen.beyond.cells() {
             let row = cells.start / width;
             let mut cell = cells.start;
-            for run in seen.numbers[cells].chunk_by(|a, b| a == b) {
-                let (first, n) = (cell, (run[0][0] as usize).wrapping_sub(1));
-                cell += run.len();
-                match items.get(n) {
-                    None => {}
-                    Some(None) => self.labels[first..cell].fill(COVERED),
-                    Some(Some(item)) => {
-                        let first = [first - row * width, row];
-                        self.fill_run(seen, (n, *item), (first, run.len()), tones, shading);
+            while cell < cells.end {
+                let (first, number) = (cell, self.labels[cell]);
+                let rest = &self.labels[cell..cells.end];
+                cell += rest.iter().position(|other| *other != number).unwrap_or(rest.len());
+                let n = (number as usize).wrapping_sub(1);
+                let Some(item) = items.get(n) else {
+                    self.labels[first..cell].fill(NOTHING);
+                    continue;
+                };
+                self.in_front[n] = true;
+                match item {
+                    None => self.labels[first..cell].fill(COVERED),
+                    Some(item) => {
+                        let from = [first - row * width, row];
+                        self.fill_run(seen, (n, *item), (from, cell - first), tones, shading);
                     }
                 }
             }
@@ -262,10 +258,13 @@ impl Cells {
     ) {
         let has_shades = item.stem.is_none();
         let even = if has_shades { shading.even(n) } else { None };
+        let known = if seen.mesh.places.is_empty() { Some(self.table(item)) } else { None };
         for column in first..first + count {
             let at = [column, row];
             let weights = || cells::weights(seen.lit.corners(n), at);
-            if let Some(color) = seen.lit.pictured(n, weights) {
+            if known.is_none()
+                && let Some(color) = seen.lit.pictured(n, weights)
+            {
                 item.tone = tones.nearest(item.look.1, color);
             }
             let strength = match even {
@@ -273,7 +272,11 @@ impl Cells {
                 None if has_shades => shading.uneven(n, at),
                 None => 0.0,
             };
-            let number = self.number(item, item.step(strength));
+            let table = match known {
+                Some(table) => table,
+                None => self.table(item),
+            };
+            let number = self.number(table, item, item.step(strength));
             let shade = &mut self.shades[number as usize];
             (shade.sum, shade.count) = (shade.sum + strength, shade.count + 1);
             let cell = row * seen.size[0] + column;
@@ -281,8 +284,8 @@ impl Cells {
         }
     }
 
-    /// The number of a shade of an item.
-    fn number(&mut self, item: Item, step: i32) -> u32 {
+    /// The number of the table of an item.
+    fn table(&mut self, item: Item) -> usize {
         let table = match self.last.filter(|(last, _)| *last == item) {
             Some((_, table)) => table,
             None => *self.items.entry(item).or_insert_with(|| {
@@ -291,6 +294,11 @@ impl Cells {
             }),
         };
         self.last = Some((item, table));
+        table
+    }
+
+    /// The number of a shade of an item, which has this table.
+    fn number(&mut self, table: usize, item: Item, step: i32) -> u32 {
         let table = &mut self.tables[table];
         let at = (step - DARKEST) as usize;
         if at >= table.len() {
@@ -306,20 +314,14 @@ impl Cells {
 
 /// Gives more shades to the looks of surfaces that cover more than so many cells each. Triangles of one look follow one another, and so do
 /// those of one surface.
-fn shade_finely(
-    mesh: &Triangles,
-    items: &mut [Option<Item>],
-    numbers: &[[u32; 1]],
-    seen: &Spans,
-    large: usize,
-) {
+fn shade_finely(mesh: &Triangles, items: &mut [Option<Item>], numbers: &[u32], seen: &Spans, large: usize) {
     let mut covered = vec![0; items.len() + 1];
     // Nothing is no surface.
     let surface = |number: u32| Some(mesh.faces[(number as usize).checked_sub(1)?].surface);
     let mut run: Vec<u32> = Vec::new();
     for row in seen.cells().step_by(APART) {
         run.clear();
-        run.extend(numbers[row].iter().step_by(APART).map(|[number]| *number));
+        run.extend(numbers[row].iter().step_by(APART));
         let wide = run.chunk_by(|a, b| surface(*a) == surface(*b)).filter(|run| run.len() >= WIDE);
         wide.flatten().for_each(|number| covered[*number as usize] += APART * APART);
     }
@@ -358,13 +360,19 @@ fn face_items(item_of: &[Option<Item>], of_item: &FxHashMap<Item, u32>) -> Vec<F
 }
 
 /// Leaves the cells around a raster empty: none of them is in the picture.
-fn clear_rim(labels: &mut [u32], width: usize) {
+fn clear_rim(labels: &mut [u32], width: usize, spans: &Spans) {
     let last = labels.len().saturating_sub(width);
-    labels[last..].fill(NOTHING);
-    for row in labels.chunks_mut(width) {
-        (row[0], row[width - 1]) = (NOTHING, NOTHING);
+    for cells in spans.cells() {
+        if cells.start < width || cells.start >= last {
+            labels[cells].fill(NOTHING);
+            continue;
+        }
+        for at_rim in
+            [cells.start, cells.end - 1].into_iter().filter(|cell| matches!((cell + 1) % width, 0 | 1))
+        {
+            labels[at_rim] = NOTHING;
+        }
     }
-    labels[..width].fill(NOTHING);
 }
 
 /// The item (module and material) of each region, by number in the order of painting; and the number of each item.

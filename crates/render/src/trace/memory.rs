@@ -3,7 +3,6 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use super::regions::{NO_SAMPLES, NOTHING};
 use super::spans::Spans;
 
 /// Rasters of more cells are not kept.
@@ -19,10 +18,9 @@ pub(crate) struct Memory(Mutex<Vec<Rasters>>);
 #[derive(Debug, Default)]
 pub(crate) struct Rasters {
     /// Empty between pictures.
-    pub(super) numbers: Vec<[u32; 1]>,
-    pub(super) depths: Vec<[f32; 1]>,
-    pub(super) labels: Vec<u32>,
-    pub(super) places: Vec<u32>,
+    pub(super) numbers: Vec<u32>,
+    pub(super) depths: Vec<f32>,
+    /// Of cells that have anything only.
     pub(super) strengths: Vec<f32>,
     pub(super) marks: MarkMemory,
 }
@@ -30,25 +28,20 @@ pub(crate) struct Rasters {
 /// Marks on cells, which need not be taken away: those of something new have numbers that no mark has yet.
 #[derive(Debug, Default)]
 pub(crate) struct MarkMemory {
-    pub(super) on: [Vec<u32>; 3],
+    pub(super) on: Vec<u32>,
     last: u32,
-    /// Of no cell anything between pictures.
-    pub(super) first: Vec<u32>,
 }
 
 impl MarkMemory {
     /// Room for marks on so many cells, if there is none yet on `most`, and the last number that was used.
     pub(super) fn begin(&mut self, cells: usize, most: usize) -> u32 {
         if self.last > MOST_MARKS {
-            self.on.iter_mut().for_each(|on| on.fill(0));
+            self.on.fill(0);
             self.last = 0;
         }
         let room = if most > MOST_CELLS { cells } else { most.max(cells) };
-        for on in self.on.iter_mut().filter(|on| on.len() < cells) {
-            *on = vec![0; room];
-        }
-        if self.first.len() < cells {
-            self.first = vec![NO_SAMPLES; room];
+        if self.on.len() < cells {
+            self.on = vec![0; room];
         }
         self.last
     }
@@ -66,15 +59,12 @@ impl Memory {
     }
 
     /// Keeps rasters for the next picture. Triangles are in the first ones of these cells, and nothing is beyond the others.
-    pub(super) fn keep(&self, mut rasters: Rasters, [seen, around]: [&Spans; 2]) {
-        if rasters.labels.len() > MOST_CELLS {
+    pub(super) fn keep(&self, mut rasters: Rasters, [seen, beyond]: [&Spans; 2]) {
+        if rasters.numbers.len() > MOST_CELLS {
             return;
         }
-        seen.fill(&mut rasters.numbers, [0]);
-        seen.fill(&mut rasters.depths, [f32::NEG_INFINITY]);
-        around.fill(&mut rasters.labels, NOTHING);
-        around.fill(&mut rasters.places, 0);
-        around.fill(&mut rasters.strengths, 0.0);
+        seen.fill(&mut rasters.depths, f32::NEG_INFINITY);
+        beyond.fill(&mut rasters.numbers, 0);
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(rasters);
     }
 }

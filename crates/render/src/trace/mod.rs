@@ -14,6 +14,7 @@
 //! them. In a scene of nothing but stems all are strokes but wide ones ([`stems`]), from back to front ([`order`]); those that regions hide in part are
 //! under these, too.
 
+mod cell_set;
 mod contour;
 mod edges;
 mod hidden;
@@ -40,6 +41,7 @@ use super::lens::Lens;
 use super::lighting::Lighting;
 use super::name::Names;
 use super::painter::Style;
+use super::raster::cells::Middles;
 use super::stroke::{End, Stroke, Strokes, is_thin, pixels_across};
 use super::triangles::{Solid, Triangles};
 use super::tube::{TubeStyle, Tubes, sides_for};
@@ -109,6 +111,8 @@ pub(super) fn elements(
     beside.iter().for_each(|beside| mesh.append(beside));
     drop(beside);
     let is_fine = mesh.faces.len() > PLAIN;
+    let seen: Vec<Point> = mesh.vertices.iter().map(|p| style.fit.camera.project(*p)).collect();
+    mesh.without_far_sides(&seen);
     let cell = if is_fine { finest } else { cell_of(1.0) };
     // Cells in a pixel of the page.
     let per_pixel = (cell * style.pixels).powi(-2);
@@ -117,7 +121,7 @@ pub(super) fn elements(
     let lens = Lens::new(style.fit, whole.map(|side| side as u32), [a, b, c]);
     let casting = style.casting.unwrap_or(scene);
     let lighting = Lighting::new(casting, style.fit, a, style.threads, style.floor, Some(&lens));
-    let mut lit = Lit::new(scene, &mesh, (style.fit, lighting), [a, b, c], style.floor);
+    let mut lit = Lit::new(scene, (&mesh, seen), (style.fit, lighting), [a, b, c], style.floor);
     // Of the raster only the part in which something is drawn.
     let [low, size] = drawn(&mesh, &lit, whole);
     let placement = [a, b - low[0], c - low[1]];
@@ -128,16 +132,17 @@ pub(super) fn elements(
     let most = if style.memory.is_some() { (widest * highest) as usize } else { 0 };
     let (nearest, spans) = label::nearest(&mesh, &lit, (size, most), &mut rasters);
     let around = spans.widened();
-    let mut visible = Visible { style, depths: &nearest.depths, labels: &[], size, placement };
+    let beyond = around.widened();
+    let Middles { numbers, depths } = nearest;
+    let mut visible = Visible { style, depths: &depths, labels: &[], size, placement };
     let stems = match &plan {
         Some(_) => Stems::default(),
         None => stems(scene, style, &visible, lit.lighting().is_declared()),
     };
     let tones = Tones::of(&scene.palette);
-    let seen =
-        Seen { mesh: &mesh, lit: &lit, numbers: &nearest.numbers, size, spans: &spans, around: &around };
+    let seen = Seen { mesh: &mesh, lit: &lit, size, spans: &spans, around: &around, beyond: &beyond };
     let fineness = (is_fine, per_pixel);
-    let (mut regions, shades) = label::label(seen, (&stems, &tones), fineness, most, &mut rasters);
+    let (mut regions, shades) = label::label((numbers, seen), (&stems, &tones), fineness, most, &mut rasters);
     regions.with_narrow_parts();
     regions.without_specks(per_pixel, &mut rasters.marks, most);
     let outlines = regions.outlines(shades.len(), &mut rasters.marks, most);
@@ -190,10 +195,8 @@ pub(super) fn elements(
     }
     let elements = page.finish(strokes);
     if let Some(memory) = style.memory {
-        let Regions { labels, places, strengths, .. } = regions;
-        let (numbers, depths) = (nearest.numbers, nearest.depths);
-        let rasters = Rasters { numbers, depths, labels, places, strengths, ..rasters };
-        memory.keep(rasters, [&spans, &around]);
+        let Regions { labels: numbers, strengths, .. } = regions;
+        memory.keep(Rasters { numbers, depths, strengths, ..rasters }, [&spans, &beyond]);
     }
     elements
 }

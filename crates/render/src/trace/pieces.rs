@@ -96,6 +96,12 @@ impl Pieces {
         (0..).zip(&self.0).filter(|(number, run)| run.before == *number).map(|(number, _)| number)
     }
 
+    /// Whether a piece has so many cells or fewer, given its first run.
+    pub fn has_at_most(&self, first: u32, most: usize) -> bool {
+        let left = self.cells(first).try_fold(most, |left, run| left.checked_sub(run.len()));
+        left.is_some()
+    }
+
     /// The cells of a piece, run by run, from its first one on.
     pub fn cells(&self, first: u32) -> impl Iterator<Item = Range<usize>> + '_ {
         let run = |number: u32| self.0.get(number as usize);

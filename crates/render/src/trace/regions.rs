@@ -4,12 +4,16 @@
 //! by a margin, so that no background shows through where two outlines meet, but not along an edge of those, where two half-transparent
 //! edges would lie over one another; and through holes, so that an outline within another is needed once only. A region is worked on piece by piece (cells that hang together), and the work on a piece is that of its cells.
 
+use super::cell_set::CellSet;
 use super::contour::{Corner, Hidden, Mask, Part};
+use super::label::DARKEST;
 use super::memory::MarkMemory;
 use super::pieces::Pieces;
 use super::spans::Spans;
 use std::ops::Range;
 
+/// Cells of a row that are looked at together.
+const BLOCK: usize = 8;
 /// The width of the margin, in cells.
 const MARGIN: usize = 3;
 /// What has so many of the eight cells around a cell, or fewer, is narrow there.
@@ -19,8 +23,6 @@ const WITHIN: f64 = 0.004;
 
 /// No region.
 pub const NOTHING: u32 = u32::MAX;
-/// No cell around has samples.
-pub const NO_SAMPLES: u32 = u32::MAX;
 /// Cells that will be drawn over by something else, so that regions may reach there.
 pub const COVERED: u32 = u32::MAX - 1;
 
@@ -40,10 +42,8 @@ pub struct Regions {
     pub around: Spans,
     /// By cell; [`NOTHING`] for the background, [`COVERED`] where something else is drawn.
     pub labels: Vec<u32>,
-    /// By cell: its place among those with `per_cell` samples, from 1 on, if it is at the edge of an item or at a crease; else 0.
-    pub places: Vec<u32>,
-    /// These cells.
-    pub edge_cells: Vec<u32>,
+    /// The cells at the edge of an item or at a crease, each with `per_cell` samples.
+    pub edges: CellSet,
     pub samples: Vec<Sample>,
     pub per_cell: usize,
     /// By region: its item (module and material), in the order of painting, and its shade.
@@ -57,58 +57,64 @@ pub struct Regions {
     pub means: Vec<f64>,
 }
 
-/// Marks on the cells of a raster, a number for each region piece, so that they need not be taken away.
+/// Marks on the cells of a raster, so that they need not be taken away: the last piece that a cell was found to be in, or is covered by, or the last hole
+/// that it was seen in. Each has an even number; it is odd if an outline of the piece passed above the cell.
 struct Marks<'a> {
-    /// The last piece that a cell was found to be in, or is covered by.
-    inside: &'a mut [u32],
-    /// The last piece an outline of which passed above a cell.
-    begun: &'a mut [u32],
-    /// The last hole that a cell was seen in.
-    seen: &'a mut [u32],
-    holes: u32,
+    on: &'a mut [u32],
+    last: u32,
+}
+
+impl Marks<'_> {
+    /// The number of something new.
+    fn next(&mut self) -> u32 {
+        self.last += 2;
+        self.last
+    }
+
+    fn is_on(&self, cell: usize, number: u32) -> bool {
+        self.on[cell] | 1 == number | 1
+    }
 }
 
 /// Where the samples of cells at edges come in the order of painting.
 struct Ranks<'a> {
     per_cell: usize,
-    all: Vec<u64>,
-    /// By cell: the first item that is seen in it or in those around it, plus 1, as far as there are samples; or 0 if something is open.
-    first: &'a mut [u32],
+    all: Vec<i32>,
+    edges: &'a CellSet,
+    /// By cell of these: the first item that is seen in it, plus 1; or 0 if something is open.
+    first: Vec<u32>,
 }
 
-/// Where a shade of an item comes in the order of painting: after 0, which is nothing.
-fn rank(item: u32, step: i32) -> u64 {
-    (u64::from(item) + 1) << 32 | u64::from(step as u32 ^ 1 << 31)
+/// Bits for the shades of an item. What is left is enough for eight million items.
+const SHADE_BITS: u32 = 9;
+/// Comes before all shades of all items.
+const FIRST: i32 = i32::MIN;
+
+/// Where a shade of an item comes in the order of painting: so short that four are compared at a time.
+fn rank(item: u32, step: i32) -> i32 {
+    let shade = step.saturating_sub(DARKEST).clamp(0, (1 << SHADE_BITS) - 1) as u32;
+    let number = item.saturating_add(1).min(u32::MAX >> SHADE_BITS);
+    ((number << SHADE_BITS | shade) ^ 1 << 31) as i32
+}
+
+/// The item of a rank plus 1, or 0.
+fn item_of(rank: i32) -> u32 {
+    (rank as u32 ^ 1 << 31) >> SHADE_BITS
 }
 
 impl<'a> Ranks<'a> {
-    /// `first` is of a raster in which no cell has samples.
-    fn of(regions: &Regions, first: &'a mut [u32]) -> Ranks<'a> {
-        let of = |sample: &Sample| if sample.item == NOTHING { 0 } else { rank(sample.item, sample.step) };
-        let all: Vec<u64> = regions.samples.iter().map(of).collect();
-        for (cell, ranks) in regions.edge_cells.iter().zip(all.chunks_exact(regions.per_cell)) {
-            let least = (ranks.iter().fold(u64::MAX, |a, b| a.min(*b)) >> 32) as u32;
-            for near in regions.cross(*cell as usize) {
-                if let Some(first) = first.get_mut(near) {
-                    *first = least.min(*first);
-                }
-            }
-        }
-        Ranks { per_cell: regions.per_cell, all, first }
-    }
-
-    /// Takes the samples away.
-    fn clear(self, regions: &Regions) {
-        for cell in regions.edge_cells.iter().flat_map(|cell| regions.cross(*cell as usize)) {
-            if let Some(first) = self.first.get_mut(cell) {
-                *first = NO_SAMPLES;
-            }
-        }
+    fn of(regions: &'a Regions) -> Ranks<'a> {
+        let of =
+            |sample: &Sample| if sample.item == NOTHING { FIRST } else { rank(sample.item, sample.step) };
+        let all: Vec<i32> = regions.samples.iter().map(of).collect();
+        let least = |ranks: &[i32]| item_of(ranks.iter().fold(i32::MAX, |a, b| a.min(*b)));
+        let first = all.chunks_exact(regions.per_cell).map(least).collect();
+        Ranks { per_cell: regions.per_cell, all, edges: &regions.edges, first }
     }
 
     /// The part of the samples of a cell that comes no earlier.
-    fn part(&self, place: u32, least: u64) -> f64 {
-        let first = (place as usize - 1) * self.per_cell;
+    fn part(&self, place: usize, least: i32) -> f64 {
+        let first = place * self.per_cell;
         let samples = &self.all[first..first + self.per_cell];
         samples.iter().map(|rank| u32::from(*rank >= least)).sum::<u32>() as f64 / self.per_cell as f64
     }
@@ -119,7 +125,7 @@ impl Regions {
     /// cells around it. So what is narrow hangs together; how wide it is, the samples say. A gap is such a thing, too.
     pub fn with_narrow_parts(&mut self) {
         let mut changes = Vec::new();
-        for (cell, samples) in self.edge_cells.iter().zip(self.samples.chunks_exact(self.per_cell)) {
+        for (cell, samples) in self.edges.cells().iter().zip(self.samples.chunks_exact(self.per_cell)) {
             let cell = *cell as usize;
             if !self.is_at_rim(cell)
                 && let Some(label) = self.narrow_part(cell, samples)
@@ -182,18 +188,16 @@ impl Regions {
     /// The outlines of `count` regions, by number, in cells from the upper left corner. Memory is for `most` cells, if there are no more.
     pub fn outlines(&self, count: usize, memory: &mut MarkMemory, most: usize) -> Vec<Vec<Vec<Corner>>> {
         let cells = self.labels.len();
-        let mut number = memory.begin(cells, most);
-        let mut first = std::mem::take(&mut memory.first);
-        let samples = Ranks::of(self, &mut first);
-        let [inside, begun, seen] = memory.on.each_mut().map(|on| &mut on[..cells]);
-        let mut marks = Marks { inside, begun, seen, holes: number };
+        let last = memory.begin(cells, most).next_multiple_of(2);
+        let samples = Ranks::of(self);
+        let mut marks = Marks { on: &mut memory.on[..cells], last };
         let mut outlines = vec![Vec::new(); count];
         let pieces = Pieces::of(&self.labels, self.width, &self.around);
         let mut rim = Vec::new();
         for first in pieces.firsts() {
-            number += 1;
-            let label = self.gather(pieces.cells(first), number, marks.inside, &mut rim);
-            self.spread((label, number), &samples, marks.inside, &mut rim);
+            let number = marks.next();
+            let label = self.gather(pieces.cells(first), number, marks.on, &mut rim);
+            self.spread((label, number), &samples, marks.on, &mut rim);
             outlines[label as usize].append(&mut self.outlines_of(
                 (label, number),
                 &samples,
@@ -201,10 +205,8 @@ impl Regions {
                 &mut marks,
             ));
         }
-        let last = number.max(marks.holes);
+        let last = marks.last + 1;
         memory.end(last);
-        samples.clear(self);
-        memory.first = first;
         outlines
     }
 
@@ -222,13 +224,22 @@ impl Regions {
             label = self.labels[run.start];
             inside[run.clone()].fill(number);
             let last = run.end - 1;
-            let is_at_rim = |cell: &usize| {
-                let beside = [cell - self.width, cell + self.width];
-                *cell == run.start
-                    || *cell == last
-                    || beside.into_iter().any(|other| self.labels[other] != label)
-            };
-            rim.extend(run.clone().filter(is_at_rim));
+            rim.push(run.start);
+            let [above, below] = [run.start - self.width, run.start + self.width]
+                .map(|start| &self.labels[start..start + run.len()]);
+            let blocks = above.chunks(BLOCK).zip(below.chunks(BLOCK));
+            for (first, (above, below)) in run.clone().step_by(BLOCK).zip(blocks) {
+                // Most are in the midst of their region.
+                if above.iter().zip(below).fold(0, |all, (a, b)| all | (a ^ label) | (b ^ label)) == 0 {
+                    continue;
+                }
+                let open = above.iter().zip(below).map(|(a, b)| (a ^ label) | (b ^ label) != 0);
+                let open = (first..).zip(open).filter(|(_, open)| *open).map(|(cell, _)| cell);
+                rim.extend(open.filter(|cell| *cell != run.start && *cell != last));
+            }
+            if last > run.start {
+                rim.push(last);
+            }
         }
         label
     }
@@ -266,21 +277,16 @@ impl Regions {
 
     /// Whether nothing painted before a region shows in a cell, nor in those around it.
     fn is_amid(&self, cell: usize, label: u32, samples: &Ranks) -> bool {
-        samples.first[cell] > self.items[label as usize]
-    }
-
-    /// A cell and those beside, above and below it; some may be beyond the raster.
-    fn cross(&self, cell: usize) -> [usize; 5] {
-        let by = |by: usize| [cell.wrapping_sub(by), cell + by];
-        let ([left, right], [up, down]) = (by(1), by(self.width));
-        [cell, left, right, up, down]
+        let item = self.items[label as usize];
+        let shows = |cell: usize| samples.edges.place(cell).is_some_and(|place| samples.first[place] <= item);
+        !(shows(cell) || self.around(cell).into_iter().any(shows))
     }
 
     /// Adds the cells of a hole, one of which is given, to a piece if all of them are painted later. False if not.
     fn fill(&self, hole: usize, number: u32, label: u32, marks: &mut Marks) -> bool {
-        marks.holes += 1;
+        let seen = marks.next();
         let mut cells = vec![hole];
-        marks.seen[hole] = marks.holes;
+        marks.on[hole] = seen;
         let mut next = 0;
         while let Some(&cell) = cells.get(next) {
             next += 1;
@@ -288,13 +294,13 @@ impl Regions {
                 return false;
             }
             for other in self.around(cell) {
-                if marks.inside[other] != number && marks.seen[other] != marks.holes {
-                    marks.seen[other] = marks.holes;
+                if !marks.is_on(other, number) && marks.on[other] != seen {
+                    marks.on[other] = seen;
                     cells.push(other);
                 }
             }
         }
-        cells.into_iter().for_each(|cell| marks.inside[cell] = number);
+        cells.into_iter().for_each(|cell| marks.on[cell] = number);
         true
     }
 
@@ -308,28 +314,35 @@ impl Regions {
     ) -> Vec<Vec<Corner>> {
         let (item, step) = (self.items[label as usize], self.steps[label as usize]);
         let mut outlines = Vec::new();
+        let mut passed = Vec::new();
         for &cell in rim {
-            let Marks { inside, begun, .. } = marks;
+            if marks.on[cell] == number + 1 {
+                continue;
+            }
+            let is_inside = |cell: usize| marks.on.get(cell).is_some_and(|mark| mark | 1 == number + 1);
             // The part of a cell that this region covers, or one that is painted later.
-            let covered = |cell: usize, part: Part| match self.places[cell] {
-                0 => f64::from(u8::from(inside[cell] == number)),
-                place => samples.part(place, rank(item, if part == Part::Shade { step } else { i32::MIN })),
+            let covered = |cell: usize, part: Part| match self.edges.place(cell) {
+                None => f64::from(u8::from(is_inside(cell))),
+                Some(place) => {
+                    samples.part(place, rank(item, if part == Part::Shade { step } else { i32::MIN }))
+                }
             };
             let shade = |cell: usize| {
                 let is_own = self.items.get(self.labels[cell] as usize) == Some(&item);
                 is_own.then(|| f64::from(self.strengths[cell]) - self.least[label as usize])
             };
             let hidden = |cell: usize| {
-                let is_under = inside[cell] != number && self.is_free(cell, label);
+                let is_under = !is_inside(cell) && self.is_free(cell, label);
                 is_under
                     .then(|| if self.is_amid(cell, label, samples) { Hidden::Amid } else { Hidden::NearEdge })
             };
-            let inside = |cell| inside.get(cell) == Some(&number);
-            let mask = Mask { width: self.width, inside, covered, shade, hidden };
-            if begun[cell] == number || !mask.is_top(cell) {
+            let mask = Mask { width: self.width, inside: is_inside, covered, shade, hidden };
+            if !mask.is_top(cell) {
                 continue;
             }
-            let outline = mask.follow(cell, |cell| begun[cell] = number);
+            passed.clear();
+            let outline = mask.follow(cell, |cell| passed.push(cell));
+            passed.iter().for_each(|cell| marks.on[*cell] = number + 1);
             if !outline.is_hole || !self.fill(cell - self.width, number, label, marks) {
                 outlines.extend(outline.simplified());
             }
@@ -361,7 +374,7 @@ pub(super) mod tests {
         let rows: Vec<&str> =
             [&rim[..]].into_iter().chain(rows.iter().map(String::as_str)).chain([&rim[..]]).collect();
         let labels: Vec<u32> = rows.iter().flat_map(|row| row.bytes().map(label)).collect();
-        let places = vec![0; labels.len()];
+        let edges = CellSet::new(labels.len());
         let items = (0..10).collect();
         let (width, strengths) = (rim.len(), vec![0.0; labels.len()]);
         let around = Spans::new(width, vec![[0, width as u32]; labels.len() / width]);
@@ -369,8 +382,7 @@ pub(super) mod tests {
             width,
             around,
             labels,
-            places,
-            edge_cells: Vec::new(),
+            edges,
             samples: Vec::new(),
             per_cell: 1,
             items,
@@ -398,11 +410,11 @@ pub(super) mod tests {
         // Half of each cell in the first row is background.
         for column in 1..13 {
             let cell = of.width + column;
-            of.places[cell] = column as u32;
-            of.edge_cells.push(cell as u32);
+            of.edges.insert(cell);
             let item = of.labels[cell];
             of.samples.extend([item, item, NOTHING, NOTHING].map(|item| Sample { item, step: 0 }));
         }
+        of.edges.number(of.around.cells());
         let outlines = of.outlines(2, &mut MarkMemory::default(), 0);
         let reach = |upto: f64| {
             let within = outlines[0][0].iter().filter(|[_, y]| *y < upto);
@@ -441,18 +453,20 @@ pub(super) mod tests {
         let mut of = regions(&["0000000", "0100010", "0000000"]);
         of.per_cell = 4;
         let row = 2 * of.width;
-        for (place, cell) in (1..).zip(row + 3..row + 6) {
-            of.places[cell] = place;
-            of.edge_cells.push(cell as u32);
+        for cell in row + 3..row + 6 {
+            of.edges.insert(cell);
             let sample = |item| Sample { item, step: 0 };
             of.samples.extend([1, 0, 0, 0].map(sample));
         }
+        of.edges.number(of.around.cells());
         of.with_narrow_parts();
         assert_eq!(of.labels[row + 2..row + 7], [1; 5]);
         assert_eq!(of.outlines(2, &mut MarkMemory::default(), 0)[1].len(), 1);
         // What is as wide as it has cells around is none.
         let mut wide = regions(&["1111111", "0000000", "0000000"]);
-        (wide.per_cell, wide.places[row + 3], wide.edge_cells) = (4, 1, vec![row as u32 + 3]);
+        wide.per_cell = 4;
+        wide.edges.insert(row + 3);
+        wide.edges.number(wide.around.cells());
         wide.samples = [1, 1, 0, 0].map(|item| Sample { item, step: 0 }).to_vec();
         wide.with_narrow_parts();
         assert_eq!(wide.labels[row + 3], 0);

@@ -1,7 +1,8 @@
 //! Pieces of regions that are too small for an outline of their own.
 
 use super::memory::MarkMemory;
-use super::regions::{COVERED, Regions};
+use super::pieces::Pieces;
+use super::regions::Regions;
 
 /// Pieces of so many pixels, and of so many cells, may belong to a neighbour whose light differs by no more than this; those of a pixel to one
 /// whose light differs by more.
@@ -20,13 +21,12 @@ impl Regions {
         let mut piece = Vec::with_capacity(most);
         // The last piece that a cell was looked at for.
         let mut number = marks.begin(self.labels.len(), cells);
-        let seen = &mut marks.on[0];
+        let seen = &mut marks.on;
         let around = std::mem::take(&mut self.around);
-        for cell in around.cells().flatten() {
-            // In the midst of a row of a region, as most are.
-            if cell > 0 && self.labels[cell] == self.labels[cell - 1] || !self.is_first(cell) {
-                continue;
-            }
+        let pieces = Pieces::of(&self.labels, self.width, &around);
+        // Labels change on the way: a piece that has grown by then is not a small one, or begins before its first cell.
+        for first in pieces.firsts().filter(|first| pieces.has_at_most(*first, most)) {
+            let Some(cell) = pieces.cells(first).next().map(|run| run.start) else { continue };
             number += 1;
             let mut is_new = |cell: usize| std::mem::replace(&mut seen[cell], number) != number;
             if self.gather_speck(cell, most, &mut is_new, &mut piece) {
@@ -38,16 +38,6 @@ impl Regions {
         }
         self.around = around;
         marks.end(number);
-    }
-
-    /// Whether no cell that touches this one in the row above, or the one before, is of its region.
-    fn is_first(&self, cell: usize) -> bool {
-        let label = self.labels[cell];
-        // None of these is in the first row.
-        label < COVERED && self.labels[cell - 1] != label && {
-            let above = cell - self.width;
-            [above - 1, above, above + 1].into_iter().all(|other| self.labels[other] != label)
-        }
     }
 
     /// Whether the piece of a region of which this is the first cell has so many cells at most: these cells. `is_new` tells whether one is asked for
