@@ -124,8 +124,8 @@ impl<'s> Field<'s> {
     pub(super) fn large(&self) -> Cow<'s, Scene> {
         let accuracy = |at| self.accuracy(at);
         match self.scene.flattened_with(|number| self.shown[number] == Shown::All) {
-            Cow::Borrowed(scene) => self.fit.drawn(scene.drafted_scene(accuracy)),
-            Cow::Owned(scene) => Cow::Owned(self.fit.drawn(scene.drafted_scene(accuracy)).into_owned()),
+            Cow::Borrowed(scene) => self.fit.drawn(scene.outlined_scene(accuracy)),
+            Cow::Owned(scene) => Cow::Owned(self.fit.drawn(scene.outlined_scene(accuracy)).into_owned()),
         }
     }
 
@@ -196,7 +196,7 @@ fn count(scene: &Scene, place: &Placement, accuracy: &dyn Fn(Point) -> f64) -> u
         let placement = surface.placement.within(place);
         let accuracy = accuracy(placement.origin) / placement.largest();
         match &surface.patches {
-            Some(patches) => patches.draft(accuracy).faces.len(),
+            Some(patches) => patches.outlined(accuracy).faces.len(),
             None => surface.mesh.draft(accuracy).as_ref().unwrap_or(&surface.mesh).faces.len(),
         }
     });

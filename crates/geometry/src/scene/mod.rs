@@ -26,6 +26,7 @@ mod flat;
 mod gas;
 mod material;
 mod mesh;
+mod outline;
 mod patch;
 mod pieces;
 mod sheet;
@@ -263,6 +264,16 @@ impl Scene {
     /// `accuracy` (scene units) of its shape, which may depend on its place, and on a ball
     /// around it: middle and radius.
     pub fn drafted(&self, accuracy: impl Fn(Point, (Point, f64)) -> f64) -> Cow<'_, [Surface]> {
+        self.drafted_by(accuracy, PatchSet::draft, Patch::draft)
+    }
+
+    /// The same by these functions of an accuracy.
+    fn drafted_by(
+        &self,
+        accuracy: impl Fn(Point, (Point, f64)) -> f64,
+        of_set: fn(&PatchSet, f64) -> Arc<Mesh>,
+        of_patch: fn(&Patch, f64) -> Surface,
+    ) -> Cow<'_, [Surface]> {
         if self.patches.is_empty() && self.surfaces.is_empty() {
             return Cow::Borrowed(&self.surfaces);
         }
@@ -273,7 +284,7 @@ impl Scene {
             let ball = (place.point(middle), radius * place.largest());
             let accuracy = accuracy(place.origin, ball) / place.largest();
             match surface.patches.take() {
-                Some(patches) => surface.mesh = patches.draft(accuracy),
+                Some(patches) => surface.mesh = of_set(&patches, accuracy),
                 None => surface.mesh = surface.mesh.draft(accuracy).unwrap_or(surface.mesh),
             }
             surface
@@ -283,14 +294,14 @@ impl Scene {
             let points = || patch.net.iter().flatten();
             let (low, high) = points().fold((from, from), |(low, high), p| (low.inf(p), high.sup(p)));
             let ball = (nalgebra::center(&low, &high), (high - low).norm() / 2.0);
-            patch.draft(accuracy(from, ball))
+            of_patch(patch, accuracy(from, ball))
         });
         Cow::Owned(placed.chain(patches).collect())
     }
 
-    /// The scene with meshes in place of everything curved, as detailed as a picture needs: see [`drafted`](Scene::drafted).
-    pub fn drafted_scene(&self, accuracy: impl Fn(Point) -> f64) -> Cow<'_, Scene> {
-        match self.drafted(|at, _| accuracy(at)) {
+    /// The scene with meshes in place of everything curved, as detailed as a picture of outlines needs, by accuracy: see [`Patch::outlined`].
+    pub fn outlined_scene(&self, accuracy: impl Fn(Point) -> f64) -> Cow<'_, Scene> {
+        match self.drafted_by(|at, _| accuracy(at), PatchSet::outlined, Patch::outlined) {
             Cow::Borrowed(_) => Cow::Borrowed(self),
             Cow::Owned(surfaces) => Cow::Owned(Scene { surfaces, patches: Vec::new(), ..self.clone() }),
         }

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 use super::bernstein::{Column, normal, point, slopes, weights};
+use super::outline;
 use super::pieces::{FINEST, Steps};
 use super::{MaterialId, Mesh, OwnerId, Placement, Point, Surface, Vector, ball};
 
@@ -75,6 +76,11 @@ impl Patch {
         self.placed(accuracy, Steps::Shape)
     }
 
+    /// The same for a picture of outlines, of still fewer triangles: edges are as fine as the accuracy asks for, what is within them is coarser.
+    pub fn outlined(&self, accuracy: f64) -> Surface {
+        self.placed(accuracy, Steps::Outline)
+    }
+
     fn placed(&self, accuracy: f64, steps: Steps) -> Surface {
         let origin = self.net[0][0];
         let reach = self.net.iter().flatten().map(|p| (p - origin).amax()).fold(0.0, f64::max);
@@ -105,11 +111,14 @@ pub struct PatchFace {
 #[derive(Debug)]
 pub struct PatchSet {
     shape: Curved,
-    /// Meshes that were made so far, by the exponent of their accuracy.
-    meshes: Mutex<BTreeMap<i32, Arc<Mesh>>>,
-    /// Meshes for pictures, by the exponent of their accuracy.
-    drafts: Mutex<BTreeMap<i32, Arc<Mesh>>>,
+    meshes: Meshes,
+    /// For pictures.
+    drafts: Meshes,
+    outlines: Meshes,
 }
+
+/// Meshes that were made so far, by the exponent of their accuracy.
+type Meshes = Mutex<BTreeMap<i32, Arc<Mesh>>>;
 
 #[derive(Debug)]
 enum Curved {
@@ -120,12 +129,16 @@ enum Curved {
 impl PatchSet {
     /// The surface made of these patches.
     pub fn new(faces: Vec<PatchFace>) -> PatchSet {
-        PatchSet { shape: Curved::Patches(faces), meshes: Mutex::default(), drafts: Mutex::default() }
+        PatchSet::of(Curved::Patches(faces))
     }
 
     /// A ball of diameter 1 around the origin; a colour replaces its material.
     pub fn ball(material: MaterialId) -> PatchSet {
-        PatchSet { shape: Curved::Ball(material), meshes: Mutex::default(), drafts: Mutex::default() }
+        PatchSet::of(Curved::Ball(material))
+    }
+
+    fn of(shape: Curved) -> PatchSet {
+        PatchSet { shape, meshes: Mutex::default(), drafts: Mutex::default(), outlines: Mutex::default() }
     }
 
     /// True for a ball.
@@ -144,18 +157,21 @@ impl PatchSet {
     /// The same for a picture, where the surface may be small: accuracies within a factor of the fourth root of two share a mesh, and a
     /// surface that is less than `accuracy` in size is a few triangles.
     pub fn draft(&self, accuracy: f64) -> Arc<Mesh> {
-        let exponent = (4.0 * accuracy.log2()).floor().clamp(-160.0, 12.0);
-        let accuracy = (exponent / 4.0).exp2();
-        self.kept(&self.drafts, exponent as i32, accuracy, Steps::Shape)
+        self.kept_draft(&self.drafts, accuracy, Steps::Shape)
     }
 
-    fn kept(
-        &self,
-        meshes: &Mutex<BTreeMap<i32, Arc<Mesh>>>,
-        exponent: i32,
-        accuracy: f64,
-        steps: Steps,
-    ) -> Arc<Mesh> {
+    /// The same for a picture of outlines: see [`Patch::outlined`].
+    pub fn outlined(&self, accuracy: f64) -> Arc<Mesh> {
+        self.kept_draft(&self.outlines, accuracy, Steps::Outline)
+    }
+
+    fn kept_draft(&self, meshes: &Meshes, accuracy: f64, steps: Steps) -> Arc<Mesh> {
+        let exponent = (4.0 * accuracy.log2()).floor().clamp(-160.0, 12.0);
+        let accuracy = (exponent / 4.0).exp2();
+        self.kept(meshes, exponent as i32, accuracy, steps)
+    }
+
+    fn kept(&self, meshes: &Meshes, exponent: i32, accuracy: f64, steps: Steps) -> Arc<Mesh> {
         let make = || {
             let mut mesh = Mesh::new();
             match &self.shape {
@@ -189,10 +205,10 @@ pub(super) fn column(net: &Net, c: usize) -> [Point; 4] {
 
 /// What the triangles of a patch look like.
 #[derive(Clone, Copy)]
-struct Paint {
-    material: MaterialId,
-    takes_tint: bool,
-    has_picture: bool,
+pub(super) struct Paint {
+    pub(super) material: MaterialId,
+    pub(super) takes_tint: bool,
+    pub(super) has_picture: bool,
 }
 
 /// Adds the triangles of a patch.
@@ -200,12 +216,18 @@ fn tessellate(net: &Net, accuracy: f64, steps: Steps, paint: Paint, mesh: &mut M
     let accuracy = if accuracy > 0.0 { accuracy } else { f64::MIN_POSITIVE };
     let steps = match steps {
         // A picture is where its places are.
-        Steps::Shape if paint.has_picture => Steps::Whole,
+        Steps::Shape | Steps::Outline if paint.has_picture => Steps::Whole,
         steps => steps,
     };
     // Half of the deviation for the edge, half for the triangles that lead to it.
     let [bottom, top, left, right] = edges(net).map(|edge| steps.of_edge(&edge, accuracy / 2.0));
     let (columns, rows) = steps.of_grid(net, accuracy);
+    let first = mesh.vertices.len() as u32;
+    let edges = [bottom, top, left, right];
+    if let (Steps::Outline, Some(grid)) = (steps, outline::within(edges, (columns, rows))) {
+        outline::add(net, edges, grid, paint, mesh);
+        return mesh.orient(first);
+    }
     let (columns, rows) = (columns.max(bottom).max(top), rows.max(left).max(right));
     // On an edge the grid's vertices fall upon the nearest of those that the edge has: the number of that one, the first vertex of the
     // grid that falls upon it, and its parameter.
@@ -213,7 +235,6 @@ fn tessellate(net: &Net, accuracy: f64, steps: Steps, paint: Paint, mesh: &mut M
         let nearest = (i * kept + count / 2) / count;
         ((nearest * count).div_ceil(kept), nearest as f64 / kept as f64)
     };
-    let first = mesh.vertices.len() as u32;
     let columns_of: Vec<Column> =
         (0..=columns).map(|i| Column::new(net, i as f64 / columns as f64)).collect();
     let rows_of = (0..=rows).map(|j| j as f64 / rows as f64).map(|v| (v, weights(v), slopes(v)));

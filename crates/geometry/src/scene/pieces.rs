@@ -1,8 +1,8 @@
 //! How many pieces the edges and the grid of a patch have, by accuracy.
 
-use super::Point;
 use super::bernstein::{along_rows, combined, slopes, weights};
 use super::patch::{Net, column};
+use super::{Point, Vector};
 
 /// Most pieces along an edge.
 pub(super) const FINEST: usize = 64;
@@ -14,6 +14,12 @@ const CAUTION: f64 = 0.75;
 /// What moves places within the surface changes no shape, but the places of shades: it counts with this part where the shape is all that is seen.
 const WITHIN: f64 = 0.2;
 
+/// A patch is flat if its normals are turned from the one in the middle by less than the angle with this cosine: it hardly ever hides a part of itself.
+const FLAT: f64 = 0.9;
+/// How much coarser than at its edges a patch is within them, where outlines are seen: no outline runs within a flat one, few do in another.
+const COARSER_IN_FLAT: f64 = 3.0;
+const COARSER: f64 = std::f64::consts::SQRT_2;
+
 /// The numbers of pieces that an edge may have.
 #[derive(Clone, Copy)]
 pub(super) enum Steps {
@@ -24,12 +30,14 @@ pub(super) enum Steps {
     Whole,
     /// The same where the shape is all that is seen: what moves places within the surface hardly counts.
     Shape,
+    /// The same where outlines are seen: what is within the edges is coarser than these.
+    Outline,
 }
 
 impl Steps {
     /// The least number of pieces whose square is at least this.
     fn pieces(self, square: f64) -> usize {
-        if let Steps::Whole | Steps::Shape = self {
+        if let Steps::Whole | Steps::Shape | Steps::Outline = self {
             return (square.sqrt().ceil() as usize).clamp(1, FINEST);
         }
         let mut n = 1;
@@ -51,25 +59,31 @@ impl Steps {
     pub(super) fn of_grid(self, net: &Net, accuracy: f64) -> (usize, usize) {
         match self {
             Steps::Powers => powers(strict_derivatives(net), accuracy),
-            Steps::Whole => fewest(estimated_derivatives(net, 1.0), accuracy),
-            Steps::Shape => fewest(estimated_derivatives(net, WITHIN), accuracy),
+            Steps::Whole => fewest(estimated_derivatives(net, 1.0).0, accuracy),
+            Steps::Shape => fewest(estimated_derivatives(net, WITHIN).0, accuracy),
+            Steps::Outline => {
+                let (derivatives, turn) = estimated_derivatives(net, WITHIN);
+                fewest(derivatives, accuracy * if turn >= FLAT { COARSER_IN_FLAT } else { COARSER })
+            }
         }
     }
 }
 
 /// The greatest second derivatives at the probes and a little more, or their bounds: along rows, mixed, along columns. Of what lies within the surface
-/// a part counts.
-fn estimated_derivatives(net: &Net, within: f64) -> [f64; 3] {
+/// a part counts. And the least cosine of the angle between the normal in the middle and another one.
+fn estimated_derivatives(net: &Net, within: f64) -> ([f64; 3], f64) {
     let mut greatest = [0.0_f64; 3];
+    let mut normals = [[Vector::zeros(); 3]; 3];
     let at = PROBES.map(|t| [weights(t), slopes(t), bends(t)]);
-    for of_columns in at {
+    for (of_columns, normals) in at.into_iter().zip(&mut normals) {
         // The curves of the patch, its slope and its bend at one place along its rows.
         let [values, slopes, bends] = of_columns.map(|of_columns| along_rows(net, of_columns));
-        for [values_v, slopes_v, bends_v] in at {
+        for ([values_v, slopes_v, bends_v], kept) in at.into_iter().zip(normals) {
             let second =
                 [combined(&bends, values_v), combined(&slopes, slopes_v), combined(&values, bends_v)];
             let across = combined(&slopes, values_v).cross(&combined(&values, slopes_v));
             let normal = across.try_normalize(f64::MIN_POSITIVE);
+            *kept = normal.unwrap_or_default();
             for (greatest, second) in greatest.iter_mut().zip(second) {
                 let size = second.norm();
                 let off = normal.map_or(size, |normal| normal.dot(&second).abs());
@@ -78,7 +92,9 @@ fn estimated_derivatives(net: &Net, within: f64) -> [f64; 3] {
         }
     }
     let bounds = strict_derivatives(net);
-    [0, 1, 2].map(|k| bounds[k].min(greatest[k] / CAUTION))
+    let middle = normals[1][1];
+    let turn = normals.iter().flatten().map(|normal| normal.dot(&middle)).fold(1.0, f64::min);
+    ([0, 1, 2].map(|k| bounds[k].min(greatest[k] / CAUTION)), turn)
 }
 
 /// The second derivatives of Bernstein's polynomials of degree three.
