@@ -147,11 +147,20 @@ impl FlowStage<'_, '_> {
     /// Writes the equations of the members from an instant on: as columns only, where that is enough.
     pub(super) fn write_equations(&mut self, at: SimTime, with_table: bool) {
         let (rules, frozen) = (&self.setup.model.rules, self.setup.settings.is_sliced());
+        let threads = self.threads_for(self.flows.coupled.members.len());
         let Coupled { system, members, y, .. } = &mut self.flows.coupled;
         let modules = Membership { world: self.world, members, start: at, frozen };
-        if with_table || frozen || !system.gather(rules, &modules, y.len(), Some) {
+        if with_table || frozen || !system.gather_all(rules, &modules, y.len(), threads) {
             system.rebuild(rules, &modules, Some);
         }
+    }
+
+    /// The number of threads that shall work on so many modules.
+    pub(super) fn threads_for(&self, modules: usize) -> usize {
+        let settings = &self.setup.settings;
+        // Ranges of the states at stages are kept by one thread.
+        let is_shared = modules >= settings.threads_from && self.flows.coupled.pulsing.is_empty();
+        if is_shared { settings.threads } else { 1 }
     }
 
     /// True if some condition of the coupled modules can only be found by searching their common trajectory.
