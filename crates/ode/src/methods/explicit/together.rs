@@ -37,12 +37,17 @@ struct Share<'w, 'p> {
     output: &'w mut [f64],
     /// The state at which rates are evaluated: the components, then the foreign ones.
     state: &'w mut Vec<f64>,
-    /// Which components others read, and their places in the border.
+    links: Links,
+    /// The number of exchanges so far.
+    exchanges: usize,
+}
+
+/// How a part is linked to the border.
+struct Links {
+    /// The components that others read, and their places in the border.
     outgoing: Vec<(u32, u32)>,
     /// The places of the foreign ones.
     incoming: Vec<u32>,
-    /// The number of exchanges so far.
-    exchanges: usize,
 }
 
 /// The values of the components that other parts read. There are two lists, used by turns: while some read one, others may be at the next.
@@ -59,12 +64,12 @@ impl Share<'_, '_> {
     fn evaluate(&mut self, crew: &Crew, tau: f64, stage: usize) {
         let values = &crew.border.0[self.exchanges % 2];
         self.exchanges += 1;
-        for (component, place) in &self.outgoing {
+        for (component, place) in &self.links.outgoing {
             values[*place as usize].store(self.state[*component as usize].to_bits(), Ordering::Relaxed);
         }
         crew.meeting.wait();
         let own = self.components.len();
-        for (foreign, place) in self.state[own..].iter_mut().zip(&self.incoming) {
+        for (foreign, place) in self.state[own..].iter_mut().zip(&self.links.incoming) {
             *foreign = f64::from_bits(values[*place as usize].load(Ordering::Relaxed));
         }
         self.part.rates(tau, self.state, self.k[stage]);
@@ -124,22 +129,23 @@ fn divided<'c, T>(mut column: &'c mut [T], parts: &Parts, each: usize) -> Vec<&'
     lengths.map(|length| column.split_off_mut(..length).expect("long enough")).collect()
 }
 
-/// The border of some parts; for each the components that others read, and the places of those that it reads.
-fn border(parts: &Parts) -> (Border, Vec<Vec<(u32, u32)>>, Vec<Vec<u32>>) {
+/// The border of some parts, and how each is linked to it.
+fn border(parts: &Parts) -> (Border, Vec<Links>) {
     let mut read: Vec<u32> = parts.iter().flat_map(|part| part.foreign()).copied().collect();
     read.sort_unstable();
     read.dedup();
     let place = |component: &u32| read.binary_search(component).expect("it is read") as u32;
-    let incoming = parts.iter().map(|part| part.foreign().iter().map(place).collect()).collect();
-    let outgoing = |part: &Box<dyn Part + '_>| {
+    let mut links = Vec::with_capacity(parts.len());
+    for part in parts {
         let Range { start, end } = part.components();
         let from = read.partition_point(|component| (*component as usize) < start);
         let own = read[from..].iter().take_while(|component| (**component as usize) < end);
-        own.zip(from as u32..).map(|(component, place)| (component - start as u32, place)).collect()
-    };
-    let outgoing = parts.iter().map(outgoing).collect();
+        let outgoing = own.zip(from as u32..).map(|(component, place)| (component - start as u32, place));
+        let incoming = part.foreign().iter().map(place);
+        links.push(Links { outgoing: outgoing.collect(), incoming: incoming.collect() });
+    }
     let values = || read.iter().map(|_| AtomicU64::default()).collect();
-    (Border([values(), values()]), outgoing, incoming)
+    (Border([values(), values()]), links)
 }
 
 impl Workspace {
@@ -166,19 +172,18 @@ impl Workspace {
         (output, each): (&mut [f64], usize),
         work: impl Fn(&mut Share, &Crew) -> T + Sync,
     ) -> Vec<T> {
-        let (border, outgoing, incoming) = border(&parts);
+        let (border, links) = border(&parts);
         self.states.resize_with(parts.len(), Vec::new);
         let mut k: Vec<_> = self.k.iter_mut().map(|k| divided(k, &parts, 1).into_iter()).collect();
         let mut from = divided(&mut self.from, &parts, 1).into_iter();
         let mut end = divided(&mut self.end, &parts, 1).into_iter();
         let mut other_end = divided(&mut self.other_end, &parts, 1).into_iter();
         let mut output = divided(output, &parts, each).into_iter();
-        let links = outgoing.into_iter().zip(incoming);
         let each = parts.into_iter().zip(&mut self.states).zip(links);
-        let shares = each.map(|((part, state), (outgoing, incoming))| {
+        let shares = each.map(|((part, state), links)| {
             let components = part.components();
             debug_assert!(components.end <= y.len(), "a component that there is not");
-            state.resize(components.len() + incoming.len(), 0.0);
+            state.resize(components.len() + links.incoming.len(), 0.0);
             Share {
                 y: &y[components.clone()],
                 from: from.next().expect("as many as parts"),
@@ -188,8 +193,7 @@ impl Workspace {
                 is_sum: self.is_sum.get(components.clone()).unwrap_or_default(),
                 noise: self.noise.get(components.clone()).unwrap_or_default(),
                 output: output.next().expect("as many as parts"),
-                outgoing,
-                incoming,
+                links,
                 part,
                 components,
                 state,

@@ -9,7 +9,7 @@ use crate::world::prefetch::prefetch;
 use dlsys_tree::{ModuleId, SimTime};
 
 /// So many members are looked at at a time: threads share what is left.
-const AT_A_TIME: usize = 2048;
+pub(super) const AT_A_TIME: usize = 2048;
 
 /// What a search of a member would find.
 #[derive(Clone, Copy, PartialEq, Eq)]
