@@ -36,7 +36,6 @@ enum Meeting {
 
 impl Outlook<'_> {
     /// True if it is plain that no atom changes its sign before the end, nor comes near to it.
-    #[inline(always)]
     pub fn is_quiet(&self) -> bool {
         let Outlook { state, rule, .. } = self;
         if self.solution.error <= 0.0 || state.next.near() != 0 || !state.next.changes().is_empty() {

@@ -206,7 +206,7 @@ impl FlowStage<'_, '_> {
 }
 
 /// The present value of an integrated parameter; None if it is the one in the tree.
-#[inline(always)]
+#[inline]
 fn present(state: &State, parameter: usize, solution: Option<&CoupledSolution>, at: SimTime) -> Option<f64> {
     match state.trajectories[parameter] {
         Trajectory::Coupled(component) => solution.and_then(|c| c.value(component as usize, at)),
