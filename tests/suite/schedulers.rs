@@ -122,31 +122,6 @@ fn repairs_of_stiff_steps_err_no_more_than_the_tolerance() {
     assert!(compared >= 8, "{compared} tissues");
 }
 
-/// Common steps are made by several threads, to the bits of one: in any tissue, with any method, with regions and searches between steps.
-#[test]
-fn threads_do_not_change_tissues() {
-    let times = [0.4, 1.1, 2.0];
-    for seed in 0..12 {
-        for (text, methods) in [
-            (tissue(seed), &[Method::Auto, Method::Dopri5, Method::Dop853][..]),
-            (stiff_tissue(seed), &[Method::Auto]),
-        ] {
-            let times = if methods.len() > 1 { times } else { times.map(|t| 0.02 * t) };
-            for &method in methods {
-                let with = |threads| {
-                    let settings = Settings { method, threads, threads_from: 20, ..Settings::default() };
-                    // Of errors, too.
-                    format!("{:?}", run(&text, settings, &times))
-                };
-                let alone = with(1);
-                for threads in [2, 3] {
-                    assert!(with(threads) == alone, "{threads} threads, {method:?}\n{text}");
-                }
-            }
-        }
-    }
-}
-
 /// Cells that exchange fast, each of which halves what it holds once in a unit of time.
 #[test]
 fn stiff_events_cost_what_they_touch() {
