@@ -69,6 +69,26 @@ impl Column {
     }
 }
 
+/// The rates of all components at a stage, or of those of one thread.
+pub(crate) trait Stage: Deref<Target = [f64]> {
+    /// One number.
+    fn at(&self, place: usize) -> f64;
+}
+
+impl Stage for Column {
+    #[inline]
+    fn at(&self, place: usize) -> f64 {
+        Column::at(self, place)
+    }
+}
+
+impl Stage for &mut [f64] {
+    #[inline]
+    fn at(&self, place: usize) -> f64 {
+        self[place]
+    }
+}
+
 impl Clone for Column {
     fn clone(&self) -> Column {
         let mut copy = Column::with_room(self.len);

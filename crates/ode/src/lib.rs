@@ -33,7 +33,7 @@ pub use dense::{Coefficients, Dense, MAX_DEGREE};
 pub use error::Error;
 pub use methods::Method;
 pub use one_step::{InteriorError, OneStep, Step, Trial};
-pub use rates::Rates;
+pub use rates::{Part, Rates};
 pub use roots::{Function, Root, first_root};
 pub use sparse::{Complex, Field, Pattern, Wide};
 pub use stepper::{Reached, Stepper};

@@ -1,5 +1,7 @@
 //! The right-hand side of a system of differential equations, as integrators see it.
 
+use std::ops::Range;
+
 /// A system of equations `y' = f(tau, y)`.
 ///
 /// `tau` is the time since the start of the step, in units of simulated time, so that equations keep their digits when the clock
@@ -37,6 +39,25 @@ pub trait Rates {
     fn is_algebraic(&self) -> bool {
         false
     }
+
+    /// The same system in parts, one for each thread that shall work on a step. None by default: the step is made by the thread that asks for
+    /// it.
+    fn parts(&mut self) -> Vec<Box<dyn Part + '_>> {
+        Vec::new()
+    }
+}
+
+/// Some components of a system, one after another, whose rates one thread evaluates beside those of others. Each rate is what
+/// [`Rates::rates`] writes, to the same bits.
+pub trait Part: Send {
+    /// The components; each is in one part, and parts come in their order.
+    fn components(&self) -> Range<usize>;
+
+    /// The components of other parts that rates of this one depend on, each once.
+    fn foreign(&self) -> &[u32];
+
+    /// Writes the rates of the components to `out`. In `y` are their values, then those of the foreign ones.
+    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]);
 }
 
 /// A system whose time begins `by` later: `tau = 0` here is `tau = by` there.

@@ -37,6 +37,8 @@ pub struct Workspace {
     pub(crate) other_end: Vec<f64>,
     /// The state at the end of the step.
     pub(crate) end: Vec<f64>,
+    /// The state of a stage in parts, where several threads make a step.
+    pub(crate) states: Vec<Vec<f64>>,
     /// The number of components and of stages that there is room for.
     provided: (usize, usize),
     /// The least and the greatest values of the components at the stages of the step just tried, where these are kept.
@@ -76,7 +78,7 @@ impl Workspace {
     pub(crate) fn give_back(&mut self, carried: usize) {
         let others = self.k.iter_mut().enumerate().filter(|(stage, _)| *stage != carried);
         others.map(|(_, k)| k).chain([&mut self.from, &mut self.stage]).for_each(|k| *k = Column::default());
-        self.other_end = Vec::new();
+        (self.other_end, self.states) = (Vec::new(), Vec::new());
         self.provided = (0, 0);
     }
 

@@ -119,9 +119,10 @@ pub struct Settings {
     /// More bytes of memory than this, of the process as a whole where the system tells them, are an error. By
     /// default only as much as the system does not have.
     pub max_memory: u64,
-    /// Threads that compute the lives of modules that read no others. Results do not depend on it.
+    /// Threads that compute the lives of modules that read no others, and make the common steps of those that do. Results do not depend on it.
     pub threads: usize,
-    /// Modules from which on threads share them: the lives of fewer are computed before threads have begun (differential tests).
+    /// Modules from which on threads share them: the lives of fewer are computed, and their steps made, before threads have begun
+    /// (differential tests).
     #[doc(hidden)]
     pub threads_from: usize,
     /// Productions are recorded for [`Simulation::take_events`].

@@ -2,6 +2,10 @@
 //!
 //! Threads live for one call. A panic in one of them is a panic of the caller.
 
+mod meeting;
+
+pub use meeting::{Meeting, together};
+
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 

@@ -3,12 +3,10 @@
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed. 1993, sections II.5 and II.6,
 //! and their code DOP853.
 
-use super::explicit::{Pair, Tableau, changes};
-use crate::Rates;
-use crate::column::Column;
-use crate::dense::{Dense, PLACE};
+use super::explicit::{AtPlace, Pair, Receiver, Tableau, changes};
+use crate::column::Stage;
 use crate::one_step::InteriorError;
-use crate::workspace::{FLOOR, MAX_STAGES, Workspace};
+use crate::workspace::{FLOOR, MAX_STAGES};
 
 /// The method: 12 stages and the rate at the end, three more for the dense output.
 #[derive(Clone, Debug)]
@@ -22,17 +20,17 @@ impl Pair for Dop853 {
     const INTERIOR_IS_MEASURED: bool = true;
 
     #[inline(always)]
-    fn dense<const N: usize>(
+    fn dense<const N: usize, K: Stage>(
         y: &[f64; N],
         end: &[f64; N],
-        k: &[Column; MAX_STAGES],
+        k: &[K; MAX_STAGES],
         first: usize,
         h: f64,
         count: usize,
-        out: &mut Vec<f64>,
+        out: &mut impl Receiver,
     ) {
         let hk = changes::<N, 16>(k, first, h);
-        out.extend_from_slice(dop853_dense(y, end, &hk)[..count].as_flattened());
+        out.put(dop853_dense(y, end, &hk)[..count].as_flattened());
     }
 
     /// The dense output may err a thousand times more than the end of the step where the step is twice as long as stability allows,
@@ -40,26 +38,17 @@ impl Pair for Dop853 {
     /// is measured by the defect, the difference between the rate of the output and that of the equations. For y' = zy, the defect
     /// at 0.7 is 8 to 13 times the largest error, for all z from -25 to 2 and for imaginary z up to 6; elsewhere in the step it has
     /// zeros.
-    fn interior_error(
-        work: &mut Workspace,
-        system: &mut impl Rates,
-        y: &[f64],
-        dense: &Dense,
-    ) -> InteriorError {
+    fn interior_error(h: f64, y: &[f64], place: AtPlace) -> InteriorError {
         const PER_ERROR: f64 = 8.0;
-        // The second and the third stage are no longer needed.
-        for component in 0..y.len() {
-            (work.stage[component], work.k[2][component]) = dense.at_place(component);
-        }
-        work.evaluate(system, PLACE * dense.h, 1);
+        let AtPlace { first, values, slopes, rates } = place;
         let mut inside = InteriorError::default();
         for (component, y) in y.iter().enumerate() {
-            let defect = work.k[2][component] - dense.h * work.k[1][component];
+            let defect = slopes[component] - h * rates[component];
             let error = defect.abs() / PER_ERROR;
             if error.is_finite() {
                 // A component at rest at the start moves only after it.
-                let moved = (dense.h * work.k[0][component]).abs().max(work.k[2][component].abs());
-                let scale = y.abs().max(moved).max(work.stage[component].abs()) + FLOOR;
+                let moved = (h * first[component]).abs().max(slopes[component].abs());
+                let scale = y.abs().max(moved).max(values[component].abs()) + FLOOR;
                 inside.relative = inside.relative.max(error / scale);
                 inside.absolute = inside.absolute.max(error / y.abs().max(1.0));
             }

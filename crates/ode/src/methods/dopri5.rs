@@ -3,8 +3,8 @@
 //! Sources: J. R. Dormand, P. J. Prince, "A family of embedded Runge-Kutta formulae", J. Comput. Appl. Math. 6 (1980) 19-26;
 //! E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed. 1993, sections II.5 and II.6.
 
-use super::explicit::{Pair, Tableau, changes};
-use crate::column::Column;
+use super::explicit::{Pair, Receiver, Tableau, changes};
+use crate::column::Stage;
 use crate::workspace::MAX_STAGES;
 
 /// The pair: 7 stages, order 5, dense output of degree 4.
@@ -17,17 +17,17 @@ impl Pair for Dopri5 {
     const STABILITY: f64 = 2.8;
 
     #[inline(always)]
-    fn dense<const N: usize>(
+    fn dense<const N: usize, K: Stage>(
         y: &[f64; N],
         end: &[f64; N],
-        k: &[Column; MAX_STAGES],
+        k: &[K; MAX_STAGES],
         first: usize,
         h: f64,
         count: usize,
-        out: &mut Vec<f64>,
+        out: &mut impl Receiver,
     ) {
         let hk = changes::<N, 7>(k, first, h);
-        out.extend_from_slice(dopri5_dense(y, end, &hk)[..count].as_flattened());
+        out.put(dopri5_dense(y, end, &hk)[..count].as_flattened());
     }
 }
 

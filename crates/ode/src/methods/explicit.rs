@@ -8,10 +8,11 @@
 //! control), II.5 (pairs) and II.6 (dense output); the same authors' II (1996), section IV.2 (stiffness).
 
 mod columns;
+mod together;
 
 use crate::Rates;
-use crate::column::Column;
-use crate::dense::Dense;
+use crate::column::Stage;
+use crate::dense::{Dense, PLACE};
 use crate::one_step::{InteriorError, OneStep, Step, Trial};
 use crate::workspace::{MAX_STAGES, Workspace};
 use dlsys_expr::SimTime;
@@ -49,6 +50,29 @@ impl Tableau {
     }
 }
 
+/// Where the coefficients of a dense output go, component after component.
+pub(crate) trait Receiver {
+    /// Those of the next components.
+    fn put(&mut self, coefficients: &[f64]);
+}
+
+impl Receiver for Vec<f64> {
+    #[inline(always)]
+    fn put(&mut self, coefficients: &[f64]) {
+        self.extend_from_slice(coefficients);
+    }
+}
+
+/// A part of those of all components.
+impl Receiver for &mut [f64] {
+    #[inline(always)]
+    fn put(&mut self, coefficients: &[f64]) {
+        let (next, rest) = std::mem::take(self).split_at_mut(coefficients.len());
+        next.copy_from_slice(coefficients);
+        *self = rest;
+    }
+}
+
 /// What distinguishes one pair from another.
 pub trait Pair: Clone {
     /// Its coefficients.
@@ -63,31 +87,37 @@ pub trait Pair: Clone {
 
     /// Appends the dense output of `count` of `N` components, from `first` on, to `out`: `DEGREE + 1` Bernstein coefficients for each. `y` and
     /// `end` are their values at the ends of the step, `k` the rates of all components at all stages.
-    fn dense<const N: usize>(
+    fn dense<const N: usize, K: Stage>(
         y: &[f64; N],
         end: &[f64; N],
-        k: &[Column; MAX_STAGES],
+        k: &[K; MAX_STAGES],
         first: usize,
         h: f64,
         count: usize,
-        out: &mut Vec<f64>,
+        out: &mut impl Receiver,
     );
 
-    /// As [`OneStep::interior_error`].
-    fn interior_error(
-        _work: &mut Workspace,
-        _system: &mut impl Rates,
-        _y: &[f64],
-        _dense: &Dense,
-    ) -> InteriorError {
+    /// The error of the dense output of some components inside a step of length `h`, from `y` on, by what is known at one place.
+    fn interior_error(_h: f64, _y: &[f64], _place: AtPlace) -> InteriorError {
         InteriorError::default()
     }
+}
+
+/// What is known of components at [`PLACE`] inside a step.
+pub struct AtPlace<'s> {
+    /// Their rates at the start of the step.
+    pub first: &'s [f64],
+    /// The values of the dense output, and its slopes, per unit of position.
+    pub values: &'s [f64],
+    pub slopes: &'s [f64],
+    /// The rates of the equations at these values.
+    pub rates: &'s [f64],
 }
 
 /// The rates of `N` components, from `first` on, at the first `S` stages, times the length of the step.
 #[inline(always)]
 pub(super) fn changes<const N: usize, const S: usize>(
-    k: &[Column; MAX_STAGES],
+    k: &[impl Stage; MAX_STAGES],
     first: usize,
     h: f64,
 ) -> [[f64; N]; S] {
@@ -168,6 +198,9 @@ impl<P: Pair> OneStep for Explicit<P> {
         end: Option<SimTime>,
     ) -> Dense {
         let (Step { y, start, h }, tableau) = (step, P::TABLEAU);
+        if let Some(parts) = work.parts(system, tableau.a.len() - tableau.stages) {
+            return work.dense_together::<P>(parts, step, end);
+        }
         work.from[..y.len()].copy_from_slice(y);
         for i in tableau.stages..tableau.a.len() {
             work.combine_for::<P>(i, y.len(), h);
@@ -185,7 +218,19 @@ impl<P: Pair> OneStep for Explicit<P> {
         y: &[f64],
         dense: &Dense,
     ) -> InteriorError {
-        P::interior_error(work, system, y, dense)
+        if !P::INTERIOR_IS_MEASURED {
+            return InteriorError::default();
+        }
+        if let Some(parts) = work.parts(system, 1) {
+            return work.interior_error_together::<P>(parts, y, dense);
+        }
+        // The second and the third stage are no longer needed.
+        for component in 0..y.len() {
+            (work.stage[component], work.k[2][component]) = dense.at_place(component);
+        }
+        work.evaluate(system, PLACE * dense.h, 1);
+        let [first, rates, slopes] = [0, 1, 2].map(|stage| &work.k[stage][..]);
+        P::interior_error(dense.h, y, AtPlace { first, values: &work.stage, slopes, rates })
     }
 
     fn accept(&mut self, work: &mut Workspace) -> bool {
@@ -197,6 +242,9 @@ impl<P: Pair> OneStep for Explicit<P> {
 impl Workspace {
     /// Tries a step of a pair from a state whose rates are known.
     fn attempt_pair<P: Pair>(&mut self, system: &mut impl Rates, step: Step<'_>, tolerance: f64) -> Trial {
+        if let Some(parts) = self.parts(system, P::TABLEAU.stages - 1) {
+            return self.attempt_together::<P>(parts, step, tolerance);
+        }
         let (Step { y, h, .. }, n, tableau) = (step, step.y.len(), P::TABLEAU);
         self.from[..n].copy_from_slice(y);
         for i in 1..tableau.stages {

@@ -4,8 +4,8 @@
 //! several widths ([`dlsys_wide`]). Every component is summed in the same order, alone or beside others.
 
 use super::super::dop853::join_estimates;
-use super::Pair;
-use crate::column::Column;
+use super::{Pair, Receiver};
+use crate::column::{Column, Stage};
 use crate::workspace::{FLOOR, MAX_STAGES, Workspace, part_of_sum};
 use dlsys_wide::Kernel;
 use std::marker::PhantomData;
@@ -48,7 +48,7 @@ const fn row(table: &'static [&'static [f64]], i: usize) -> &'static [f64] {
 
 /// The sum of one component's rates at the stages with these weights.
 #[inline(always)]
-fn weighed<W: Weights>(k: &[Column], component: usize) -> f64 {
+fn weighed<W: Weights>(k: &[impl Stage], component: usize) -> f64 {
     let mut sum = 0.0;
     let k = &k[..W::WEIGHTS.len()];
     for (weight, k) in W::WEIGHTS.iter().zip(k) {
@@ -61,9 +61,13 @@ fn weighed<W: Weights>(k: &[Column], component: usize) -> f64 {
 
 /// What is made of the sums of the components from `first` on.
 #[inline(always)]
-fn weigh<W: Weights>(k: &[Column], first: usize, out: &mut [f64], made: impl Fn(usize, f64) -> f64) {
+fn weigh<W: Weights>(
+    stages: &[impl Stage; MAX_STAGES],
+    first: usize,
+    out: &mut [f64],
+    made: impl Fn(usize, f64) -> f64,
+) {
     let n = out.len();
-    let stages: &[Column; MAX_STAGES] = k.first_chunk().expect("all stages");
     let mut k = [&[][..]; MAX_STAGES];
     for (k, (stage, weight)) in k.iter_mut().zip(stages.iter().zip(W::WEIGHTS)) {
         if *weight != 0.0 {
@@ -97,15 +101,15 @@ pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// The state at which a stage's rate is taken.
-struct Combination<'w, W> {
+struct Combination<'w, W, K> {
     from: &'w [f64],
-    k: &'w [Column],
+    k: &'w [K; MAX_STAGES],
     stage: &'w mut [f64],
     h: f64,
     weights: PhantomData<W>,
 }
 
-impl<W: Weights> Kernel for Combination<'_, W> {
+impl<W: Weights, K: Stage> Kernel for Combination<'_, W, K> {
     type Output = ();
 
     #[inline(always)]
@@ -116,11 +120,23 @@ impl<W: Weights> Kernel for Combination<'_, W> {
 }
 
 /// The largest errors in a step, in units of what is tolerated: by truncation and by rounding.
-struct LargestError<'w, P> {
-    work: &'w Workspace,
+///
+/// There may be more numbers than components, for whole registers.
+struct LargestError<'w, P, K> {
+    step: Tried<'w, K>,
     n: usize,
     scale: Scale,
     pair: PhantomData<P>,
+}
+
+/// What the errors of a step tried are computed from: the rates at its stages, the states at its start and at its end, which components are
+/// [`Workspace::is_sum`], and their [`Workspace::noise`].
+pub(super) struct Tried<'w, K> {
+    pub k: &'w [K; MAX_STAGES],
+    pub from: &'w [f64],
+    pub end: &'w [f64],
+    pub is_sum: &'w [bool],
+    pub noise: &'w [f64],
 }
 
 /// What the error of a component is compared with.
@@ -144,6 +160,11 @@ struct Known {
 }
 
 impl Scale {
+    /// The scale of a step of this length, with time known to a resolution.
+    fn of<P: Pair>(h: f64, tolerance: f64, resolution: f64) -> Scale {
+        Scale { h, tolerance, blur: 4.0 * resolution / P::TABLEAU.c[1] }
+    }
+
     /// The errors of a component by truncation and by rounding, given the estimate of the former.
     #[inline(always)]
     fn errors(self, estimate: f64, known: Known) -> (f64, f64) {
@@ -169,21 +190,21 @@ fn worse(a: u64, error: f64) -> u64 {
 
 const SIGN: u64 = 1 << 63;
 
-impl<P: Pair> Kernel for LargestError<'_, P> {
+impl<P: Pair, K: Stage> Kernel for LargestError<'_, P, K> {
     type Output = (f64, f64);
 
     #[inline(always)]
     fn run(self) -> (f64, f64) {
-        let LargestError { work, n, scale, .. } = self;
-        let (h, k) = (scale.h, &work.k);
+        let LargestError { step: Tried { k, from, end, is_sum, noise: noises }, n, scale, .. } = self;
+        let h = scale.h;
         let part_of_sum = part_of_sum(scale.tolerance);
-        let has_sums = work.is_sum.contains(&true);
+        let has_sums = is_sum.contains(&true);
         let (mut worst, mut roundest) = (0, 0);
         let [mut part, mut noise] = [[1.0; TILE], [0.0; TILE]];
         let [mut errors, mut low, mut roundings] = [[0.0; TILE]; 3];
         for first in (0..n).step_by(TILE) {
             // What is in the padding is computed, too.
-            let tile = first..(first + TILE).min(work.from.len());
+            let tile = first..(first + TILE).min(from.len());
             let len = tile.len();
             let errors = &mut errors[..len];
             if P::TABLEAU.e.len() > 1 {
@@ -196,15 +217,15 @@ impl<P: Pair> Kernel for LargestError<'_, P> {
                 weigh::<EstimateOf<P, 0>>(k, first, errors, |_, high| (h * high).abs());
             }
             if has_sums {
-                for (part, is_sum) in part.iter_mut().zip(&work.is_sum[first..]) {
+                for (part, is_sum) in part.iter_mut().zip(&is_sum[first..]) {
                     *part = if *is_sum { part_of_sum } else { 1.0 };
                 }
             }
-            if !work.noise.is_empty() {
-                noise.iter_mut().zip(&work.noise[first..]).for_each(|(noise, known)| *noise = *known);
+            if !noises.is_empty() {
+                noise.iter_mut().zip(&noises[first..]).for_each(|(noise, known)| *noise = *known);
             }
             // The last stage is the end of the step.
-            let (from, end) = (&work.from[tile.clone()], &work.stage[tile.clone()]);
+            let (from, end) = (&from[tile.clone()], &end[tile.clone()]);
             let (departure, second) = (&k[0][tile.clone()], &k[1][tile]);
             let (part, noise, roundings) = (&part[..len], &noise[..len], &mut roundings[..len]);
             for i in 0..len {
@@ -229,33 +250,41 @@ impl<P: Pair> Kernel for LargestError<'_, P> {
 }
 
 /// The dense output of all components.
-struct Polynomials<'w, P> {
-    work: &'w Workspace,
+struct Polynomials<'w, P, K, C> {
+    k: &'w [K; MAX_STAGES],
     y: &'w [f64],
+    end: &'w [f64],
     h: f64,
+    out: C,
     pair: PhantomData<P>,
 }
 
-impl<P: Pair> Kernel for Polynomials<'_, P> {
-    type Output = Vec<f64>;
+impl<P: Pair, K: Stage, C: Receiver> Kernel for Polynomials<'_, P, K, C> {
+    type Output = C;
 
     #[inline(always)]
-    fn run(self) -> Vec<f64> {
-        let Polynomials { work, y, h, .. } = self;
-        let (n, mut out) = (y.len(), Vec::with_capacity(y.len() * (P::DEGREE + 1)));
-        let k: &[Column; MAX_STAGES] = work.k.first_chunk().expect("all stages");
+    fn run(self) -> C {
+        let Polynomials { k, y, end, h, mut out, .. } = self;
+        let n = y.len();
         if n <= FEW {
-            for (j, (y, end)) in y.iter().zip(&work.end).enumerate() {
-                P::dense::<1>(&[*y], &[*end], k, j, h, 1, &mut out);
+            for (j, (y, end)) in y.iter().zip(end).enumerate() {
+                P::dense::<1, K>(&[*y], &[*end], k, j, h, 1, &mut out);
             }
             return out;
         }
         for first in (0..n).step_by(MANY) {
+            if first + MANY > k[0].len() {
+                // A part of the components has no padding behind it.
+                for j in first..n {
+                    P::dense::<1, K>(&[y[j]], &[end[j]], k, j, h, 1, &mut out);
+                }
+                break;
+            }
             let count = MANY.min(n - first);
             let [mut from, mut to] = [[0.0; MANY]; 2];
             from[..count].copy_from_slice(&y[first..first + count]);
-            to[..count].copy_from_slice(&work.end[first..first + count]);
-            P::dense::<MANY>(&from, &to, k, first, h, count, &mut out);
+            to[..count].copy_from_slice(&end[first..first + count]);
+            P::dense::<MANY, K>(&from, &to, k, first, h, count, &mut out);
         }
         out
     }
@@ -267,52 +296,103 @@ fn run<K: Kernel>(components: usize, kernel: K) -> K::Output {
     if components <= NARROW { kernel.run() } else { dlsys_wide::run(kernel) }
 }
 
+/// Calls a function with the weights of a stage, which have to be known when this is compiled.
+macro_rules! for_stage {
+    ($stage:expr, $pair:ident, $function:ident, $($argument:expr),*) => {
+        match $stage {
+            1 => $function::<StageOf<$pair, 1>, _>($($argument),*),
+            2 => $function::<StageOf<$pair, 2>, _>($($argument),*),
+            3 => $function::<StageOf<$pair, 3>, _>($($argument),*),
+            4 => $function::<StageOf<$pair, 4>, _>($($argument),*),
+            5 => $function::<StageOf<$pair, 5>, _>($($argument),*),
+            6 => $function::<StageOf<$pair, 6>, _>($($argument),*),
+            7 => $function::<StageOf<$pair, 7>, _>($($argument),*),
+            8 => $function::<StageOf<$pair, 8>, _>($($argument),*),
+            9 => $function::<StageOf<$pair, 9>, _>($($argument),*),
+            10 => $function::<StageOf<$pair, 10>, _>($($argument),*),
+            11 => $function::<StageOf<$pair, 11>, _>($($argument),*),
+            12 => $function::<StageOf<$pair, 12>, _>($($argument),*),
+            13 => $function::<StageOf<$pair, 13>, _>($($argument),*),
+            14 => $function::<StageOf<$pair, 14>, _>($($argument),*),
+            15 => $function::<StageOf<$pair, 15>, _>($($argument),*),
+            _ => unreachable!("there are {MAX_STAGES} stages at most, and the first needs no state"),
+        }
+    };
+}
+
+/// The state at which the rates of a stage are taken, for as many components as there are places in `state`.
+pub(super) fn combine_for<P: Pair, K: Stage>(
+    stage: usize,
+    from: &[f64],
+    k: &[K; MAX_STAGES],
+    h: f64,
+    state: &mut [f64],
+) {
+    for_stage!(stage, P, combine, from, k, h, state);
+}
+
+fn combine<W: Weights, K: Stage>(from: &[f64], k: &[K; MAX_STAGES], h: f64, state: &mut [f64]) {
+    run(state.len(), Combination::<W, K> { from, k, stage: state, h, weights: PhantomData });
+}
+
+/// The same of few components.
+fn combine_few<W: Weights, K: Stage>(from: &[f64], k: &[K; MAX_STAGES], n: usize, h: f64, state: &mut [f64]) {
+    for j in 0..n {
+        state[j] = from[j] + h * weighed::<W>(k, j);
+    }
+}
+
+/// The largest error of a component in a step of several, by truncation and by rounding, in units of what is tolerated.
+pub(super) fn largest_error<P: Pair>(
+    step: Tried<impl Stage>,
+    n: usize,
+    (h, tolerance, resolution): (f64, f64, f64),
+) -> (f64, f64) {
+    let scale = Scale::of::<P>(h, tolerance, resolution);
+    run(n, LargestError::<P, _> { step, n, scale, pair: PhantomData })
+}
+
+/// The dense output of components from `y` to `end`, in a step of this length, in `out`.
+pub(super) fn polynomials<P: Pair, K: Stage, C: Receiver>(
+    k: &[K; MAX_STAGES],
+    y: &[f64],
+    end: &[f64],
+    h: f64,
+    out: C,
+) -> C {
+    run(y.len(), Polynomials::<P, K, C> { k, y, end, h, out, pair: PhantomData })
+}
+
 impl Workspace {
     /// The dense output of all components, from `y` on, in a step of this length.
     pub(super) fn polynomials<P: Pair>(&self, y: &[f64], h: f64) -> Vec<f64> {
-        let all = Polynomials::<P> { work: self, y, h, pair: PhantomData };
-        run(y.len(), all)
+        let out = Vec::with_capacity(y.len() * (P::DEGREE + 1));
+        polynomials::<P, _, _>(self.stages(), y, &self.end, h, out)
+    }
+
+    /// The rates at all stages.
+    fn stages(&self) -> &[Column; MAX_STAGES] {
+        self.k.first_chunk().expect("all stages")
     }
 
     /// The state at which the rates of a stage are taken.
     pub(super) fn combine_for<P: Pair>(&mut self, stage: usize, n: usize, h: f64) {
-        match stage {
-            1 => self.combine::<StageOf<P, 1>>(n, h),
-            2 => self.combine::<StageOf<P, 2>>(n, h),
-            3 => self.combine::<StageOf<P, 3>>(n, h),
-            4 => self.combine::<StageOf<P, 4>>(n, h),
-            5 => self.combine::<StageOf<P, 5>>(n, h),
-            6 => self.combine::<StageOf<P, 6>>(n, h),
-            7 => self.combine::<StageOf<P, 7>>(n, h),
-            8 => self.combine::<StageOf<P, 8>>(n, h),
-            9 => self.combine::<StageOf<P, 9>>(n, h),
-            10 => self.combine::<StageOf<P, 10>>(n, h),
-            11 => self.combine::<StageOf<P, 11>>(n, h),
-            12 => self.combine::<StageOf<P, 12>>(n, h),
-            13 => self.combine::<StageOf<P, 13>>(n, h),
-            14 => self.combine::<StageOf<P, 14>>(n, h),
-            15 => self.combine::<StageOf<P, 15>>(n, h),
-            _ => unreachable!("there are {MAX_STAGES} stages at most, and the first needs no state"),
-        }
-    }
-
-    /// The state at which a stage's rate is taken, given its weights.
-    fn combine<W: Weights>(&mut self, n: usize, h: f64) {
-        let Workspace { from, stage, k, .. } = self;
+        let Workspace { from, stage: state, k, .. } = self;
+        let k = k.first_chunk().expect("all stages");
         if n <= FEW {
-            for j in 0..n {
-                stage[j] = from.at(j) + h * weighed::<W>(k, j);
-            }
-            return;
+            for_stage!(stage, P, combine_few, from, k, n, h, state);
+        } else {
+            combine_for::<P, _>(stage, from, k, h, state);
         }
-        run(n, Combination::<W> { from, k, stage, h, weights: PhantomData });
     }
 
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
     pub(super) fn largest_error<P: Pair>(&self, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
-        let scale = Scale { h, tolerance, blur: 4.0 * self.resolution / P::TABLEAU.c[1] };
+        let scale = Scale::of::<P>(h, tolerance, self.resolution);
         if n > FEW {
-            return run(n, LargestError::<P> { work: self, n, scale, pair: PhantomData });
+            let Workspace { from, stage: end, is_sum, noise, .. } = self;
+            let step = Tried { k: self.stages(), from, end, is_sum, noise };
+            return run(n, LargestError::<P, _> { step, n, scale, pair: PhantomData });
         }
         let (mut worst, mut roundest) = (0, 0.0f64);
         for j in 0..n {
@@ -346,107 +426,4 @@ impl Workspace {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::methods::dop853::Dop853;
-    use crate::methods::dopri5::Dopri5;
-    use dlsys_wide::Width;
-
-    const H: f64 = 0.3;
-    const TOLERANCE: f64 = 1e-6;
-
-    /// A step of `n` components that differ by orders of magnitude, some of which rest.
-    fn some(n: usize) -> Workspace {
-        let mut seed = n as u64;
-        let mut random = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            let x = (seed >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
-            x * 10f64.powi((seed >> 7) as i32 % 9)
-        };
-        let mut work = Workspace::default();
-        work.provide(n, MAX_STAGES);
-        for j in 0..n {
-            (work.from[j], work.stage[j], work.end[j]) = (random(), random(), random());
-            let rests = j % 7 == 3;
-            work.k.iter_mut().for_each(|k| k[j] = if rests { 0.0 } else { random() });
-        }
-        work.is_sum = (0..n).map(|j| j % 5 == 1).collect();
-        work.resolution = 1e-12;
-        work
-    }
-
-    /// One component of it.
-    fn alone(work: &Workspace, j: usize) -> Workspace {
-        let mut one = Workspace::default();
-        one.provide(1, MAX_STAGES);
-        (one.from[0], one.stage[0], one.end[0]) = (work.from[j], work.stage[j], work.end[j]);
-        one.k.iter_mut().zip(&work.k).for_each(|(one, k)| one[0] = k[j]);
-        one.is_sum = vec![work.is_sum[j]];
-        one.noise = work.noise.get(j).copied().into_iter().collect();
-        one.resolution = work.resolution;
-        one
-    }
-
-    fn bits(all: &[f64]) -> Vec<u64> {
-        all.iter().map(|x| x.to_bits()).collect()
-    }
-
-    fn check<P: Pair>(mut work: Workspace, n: usize) {
-        let scale = Scale { h: H, tolerance: TOLERANCE, blur: 4.0 * work.resolution / P::TABLEAU.c[1] };
-        let mut each: Vec<Workspace> = (0..n).map(|j| alone(&work, j)).collect();
-        let errors = each.iter().map(|one| one.largest_error::<P>(1, H, TOLERANCE));
-        let largest = errors.fold((0.0f64, 0.0f64), |(a, b), (error, rounding)| {
-            (if error > a || error.is_nan() { error } else { a }, b.max(rounding))
-        });
-        let y = work.from[..n].to_vec();
-        let polynomials: Vec<f64> =
-            each.iter().flat_map(|one| one.polynomials::<P>(&one.from[..1], H)).collect();
-        for width in Width::ALL {
-            let error = LargestError::<P> { work: &work, n, scale, pair: PhantomData };
-            let (error, rounding) = dlsys_wide::run_with(width, error);
-            assert_eq!(bits(&[error, rounding]), bits(&[largest.0, largest.1]), "{n} components, {width:?}");
-            let all = Polynomials::<P> { work: &work, y: &y, h: H, pair: PhantomData };
-            assert_eq!(bits(&dlsys_wide::run_with(width, all)), bits(&polynomials), "{n}, {width:?}");
-        }
-        for stage in 1..P::TABLEAU.a.len() {
-            work.combine_for::<P>(stage, n, H);
-            each.iter_mut().for_each(|one| one.combine_for::<P>(stage, 1, H));
-            let alone: Vec<f64> = each.iter().map(|one| one.stage[0]).collect();
-            assert_eq!(bits(&work.stage[..n]), bits(&alone), "stage {stage} of {n}");
-        }
-        for width in Width::ALL {
-            let Workspace { from, k, stage, .. } = &mut work;
-            let last = Combination::<StageOf<P, 6>> { from, k, stage, h: H, weights: PhantomData };
-            dlsys_wide::run_with(width, last);
-            each.iter_mut().for_each(|one| one.combine_for::<P>(6, 1, H));
-            let alone: Vec<f64> = each.iter().map(|one| one.stage[0]).collect();
-            assert_eq!(bits(&work.stage[..n]), bits(&alone), "{n}, {width:?}");
-        }
-    }
-
-    /// Components side by side are what each is alone, and the largest error is the largest of theirs, however many there are and however
-    /// wide registers are.
-    #[test]
-    fn components_are_what_each_is_alone() {
-        for n in [1, 2, 3, 7, 8, 9, 20, 31, 32, 33, 64, 65, 130] {
-            check::<Dopri5>(some(n), n);
-            check::<Dop853>(some(n), n);
-            let mut noisy = some(n);
-            noisy.noise = (0..n).map(|j| j as f64 * 1e-3).collect();
-            check::<Dop853>(noisy, n);
-        }
-    }
-
-    /// An error that is no number is not lost beside others.
-    #[test]
-    fn what_is_not_a_number_is_found() {
-        for (n, at) in [(1, 0), (9, 8), (70, 3), (70, 69)] {
-            let mut work = some(n);
-            work.k[4][at] = f64::NAN;
-            let (error, _) = work.largest_error::<Dopri5>(n, H, TOLERANCE);
-            assert!(error.is_nan(), "component {at} of {n}: {error}");
-            let (error, _) = { some(n) }.largest_error::<Dopri5>(n, H, TOLERANCE);
-            assert!(error.is_finite(), "{n}: {error}");
-        }
-    }
-}
+mod tests;

@@ -4,11 +4,12 @@ use crate::flow::coupled::algebra::AlgebraicError;
 use crate::flow::coupled::columns::Whole;
 use crate::flow::coupled::lanes::EvaluationPoint;
 use crate::flow::coupled::rows::VariableSource;
+use crate::flow::coupled::sections;
 use crate::flow::coupled::system::System;
 use crate::world::coupled_solution::CoupledSolution;
 use dlsys_expr::{Lanes, Scratch};
 use dlsys_model::Rule;
-use dlsys_ode::Rates;
+use dlsys_ode::{Part, Rates};
 
 /// The right-hand side of a [`System`].
 pub struct Equations<'s> {
@@ -187,6 +188,9 @@ impl Equations<'_> {
 impl Rates for Equations<'_> {
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
         let system = self.system;
+        if !system.sections.is_empty() {
+            return sections::rates(system, self.rules, tau, y, out);
+        }
         let solved = self.complete(tau, y);
         let consistent = std::mem::take(&mut self.memory.consistent);
         let y = if system.algebra.is_empty() { y } else { &consistent };
@@ -259,5 +263,9 @@ impl Rates for Equations<'_> {
 
     fn modules(&self) -> u64 {
         self.system.modules
+    }
+
+    fn parts(&mut self) -> Vec<Box<dyn Part + '_>> {
+        sections::parts(self.system, self.rules)
     }
 }

@@ -9,7 +9,7 @@
 //!                                     └▶ restart ─▶ step  a new common step ─▶ detect ─▶ schedule
 //!                                        step ─▶ repair   stiff members that the step does not resolve
 //! system ─▶ rows (table of equations) ─▶ algebra, lanes, aggregates ─▶ equations (right-hand side) ─▶ integrator
-//! columns ─▶ the equations of explicit steps without a table
+//! columns ─▶ the equations of explicit steps without a table, sections ─▶ of several threads
 //! linear ─▶ exponentials of matrices in place of steps
 //! ```
 
@@ -25,6 +25,8 @@ pub mod reintegration;
 mod repair;
 mod restart;
 pub mod rows;
+mod sections;
+mod sift;
 mod step;
 pub mod system;
 mod traffic;

@@ -6,12 +6,14 @@ use crate::flow::FlowStage;
 use crate::flow::coupled::Coupled;
 use crate::flow::coupled::linear::Linear;
 use crate::flow::coupled::rows::ComponentPlace;
+use crate::flow::coupled::sift::AT_A_TIME;
 use crate::flow::coupled::system::{Membership, integrated};
 use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::coupled_solution::CoupledSolution;
 use crate::world::prefetch::{Guide, prefetch};
+use crate::world::state::State;
 use dlsys_tree::{ModuleId, SimTime, Visit, room};
 
 /// A solution without steps begins anew, for all modules, at every event; after this many events steps are made.
@@ -59,6 +61,13 @@ impl FlowStage<'_, '_> {
         system.clear(at);
         y.reserve_exact(members.len());
         system.table.places.reserve_exact(members.len());
+        // Threads read side by side what one reads and writes at once.
+        let threads = self.threads_for(members.len());
+        let known = match threads {
+            0 | 1 => Vec::new(),
+            _ => self.present_values(&members, solution.as_ref(), at, threads),
+        };
+        let mut known = known.iter().flatten().copied();
         let mut count = 0;
         for n in 0..members.len() {
             prefetch(self.world, &members, n);
@@ -68,33 +77,53 @@ impl FlowStage<'_, '_> {
             }
             members[count] = id;
             count += 1;
-            self.gather_member(id, solution.as_ref(), at);
+            self.gather_member(id, solution.as_ref(), at, &mut known);
         }
         members.truncate(count);
         members
     }
 
-    /// Makes the present values of a module's components those of the tree, and appends them to the state vector.
+    /// The present values of the components of all members, in their order, in several lists.
+    fn present_values(
+        &self,
+        members: &[ModuleId],
+        solution: Option<&CoupledSolution>,
+        at: SimTime,
+        threads: usize,
+    ) -> Vec<Vec<f64>> {
+        let parts: Vec<&[ModuleId]> = members.chunks(AT_A_TIME).collect();
+        dlsys_threads::each(threads, parts.len(), |number| {
+            let mut values = Vec::with_capacity(AT_A_TIME);
+            for (n, id) in parts[number].iter().enumerate() {
+                prefetch(self.world, parts[number], n);
+                let Some(state) = self.world.state(*id).filter(|state| state.coupled) else { continue };
+                let parameters = self.world.tree.parameters(*id);
+                let value = |p: &usize| present(state, *p, solution, at).unwrap_or(parameters[*p]);
+                values.extend(integrated(self.setup.model, state).iter().map(value));
+            }
+            values
+        })
+    }
+
+    /// Makes the present values of a module's components those of the tree, and appends them to the state vector. Those that are known
+    /// already come from a list.
     #[inline]
-    fn gather_member(&mut self, id: ModuleId, solution: Option<&CoupledSolution>, at: SimTime) {
+    fn gather_member(
+        &mut self,
+        id: ModuleId,
+        solution: Option<&CoupledSolution>,
+        at: SimTime,
+        known: &mut impl Iterator<Item = f64>,
+    ) {
         let World { tree, states, .. } = &mut *self.world;
         let state = states.get_mut(id.slot()).expect("a member");
         let first = tree.places(id).start;
         for &parameter in integrated(self.setup.model, state) {
-            let trajectory = &mut state.trajectories[parameter];
-            let value = match *trajectory {
-                Trajectory::Coupled(component) => solution.and_then(|c| c.value(component as usize, at)),
-                Trajectory::Step(component) => state
-                    .step
-                    .as_ref()
-                    .filter(|step| step.live)
-                    .map(|step| step.dense.value(component as usize, step.dense.position(at))),
-                _ => None,
-            };
             let place = first + parameter;
+            let value = known.next().or_else(|| present(state, parameter, solution, at));
             let value = value.unwrap_or(tree.values()[place]);
             tree.set_value(place, value);
-            *trajectory = Trajectory::Coupled(self.flows.coupled.y.len() as u32);
+            state.trajectories[parameter] = Trajectory::Coupled(self.flows.coupled.y.len() as u32);
             self.flows.coupled.y.push(value);
             self.flows.coupled.system.table.places.push(ComponentPlace::new(first, id, parameter));
         }
@@ -129,7 +158,9 @@ impl FlowStage<'_, '_> {
         let is_unwatched = !self.setup.has_conditions && pulsing.is_empty() && system.algebra.is_empty();
         integrator.set_unwatched(is_unwatched);
         integrator.keep_reached(!pulsing.is_empty());
-        if linear.is_none() {
+        if linear.is_some() {
+            system.sections.clear();
+        } else {
             if !system.is_bare {
                 system.prepare_rates(rules);
             }
@@ -147,11 +178,20 @@ impl FlowStage<'_, '_> {
     /// Writes the equations of the members from an instant on: as columns only, where that is enough.
     pub(super) fn write_equations(&mut self, at: SimTime, with_table: bool) {
         let (rules, frozen) = (&self.setup.model.rules, self.setup.settings.is_sliced());
+        let threads = self.threads_for(self.flows.coupled.members.len());
         let Coupled { system, members, y, .. } = &mut self.flows.coupled;
         let modules = Membership { world: self.world, members, start: at, frozen };
-        if with_table || frozen || !system.gather(rules, &modules, y.len(), Some) {
+        if with_table || frozen || !system.gather_all(rules, &modules, y.len(), threads) {
             system.rebuild(rules, &modules, Some);
         }
+    }
+
+    /// The number of threads that shall work on so many modules.
+    pub(super) fn threads_for(&self, modules: usize) -> usize {
+        let settings = &self.setup.settings;
+        // Ranges of the states at stages are kept by one thread.
+        let is_shared = modules >= settings.threads_from && self.flows.coupled.pulsing.is_empty();
+        if is_shared { settings.threads } else { 1 }
     }
 
     /// True if some condition of the coupled modules can only be found by searching their common trajectory.
@@ -162,5 +202,18 @@ impl FlowStage<'_, '_> {
     fn has_conditions(&self, id: ModuleId) -> bool {
         let rule = self.world.state(id).and_then(|s| s.rule.get());
         rule.is_some_and(|r| !self.setup.model.rules[r].atoms.is_empty())
+    }
+}
+
+/// The present value of an integrated parameter; None if it is the one in the tree.
+#[inline]
+fn present(state: &State, parameter: usize, solution: Option<&CoupledSolution>, at: SimTime) -> Option<f64> {
+    match state.trajectories[parameter] {
+        Trajectory::Coupled(component) => solution.and_then(|c| c.value(component as usize, at)),
+        Trajectory::Step(component) => {
+            let step = state.step.as_ref().filter(|step| step.live);
+            step.map(|step| step.dense.value(component as usize, step.dense.position(at)))
+        }
+        _ => None,
     }
 }

@@ -9,6 +9,7 @@ use crate::flow::FlowStage;
 use crate::flow::coupled::Coupled;
 use crate::flow::coupled::columns::Whole;
 use crate::flow::coupled::equations::Equations;
+use crate::flow::coupled::sift::Outcome;
 use crate::flow::coupled::system::{Membership, System};
 use crate::flow::coupled::traffic::Work;
 use crate::flow::independent::crawls;
@@ -84,10 +85,7 @@ impl FlowStage<'_, '_> {
         };
         if !self.flows.coupled.integrator.is_unwatched() {
             let members = std::mem::take(&mut self.flows.coupled.members);
-            for (at, &id) in members.iter().enumerate() {
-                prefetch(self.world, &members, at);
-                self.search_member(id, from);
-            }
+            self.search_members(&members, from);
             self.flows.coupled.members = members;
         }
         if !self.flows.coupled.pending {
@@ -196,6 +194,27 @@ impl FlowStage<'_, '_> {
             }
             None => self.coupled_error(error, from),
         })
+    }
+
+    /// Finds the next events of all members before the end of the common step.
+    fn search_members(&mut self, members: &[ModuleId], from: SimTime) {
+        let threads = self.threads_for(members.len());
+        for (at, &id) in members.iter().enumerate() {
+            if threads > 1 && !self.flows.coupled.pending {
+                // The first one that needs it has asked for the dense output.
+                let outcomes = self.sift(&members[at..], from, threads);
+                for (&id, outcome) in members[at..].iter().zip(outcomes) {
+                    match outcome {
+                        Outcome::Unconcerned => {}
+                        Outcome::Quiet => self.schedule.cancel(Owner::Module(id.slot() as u32)),
+                        Outcome::Unknown => self.search_member(id, from),
+                    }
+                }
+                return;
+            }
+            prefetch(self.world, members, at);
+            self.search_member(id, from);
+        }
     }
 
     /// Finds a coupled module's next event before the end of the common step.

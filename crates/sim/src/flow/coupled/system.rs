@@ -6,6 +6,7 @@ use crate::flow::coupled::lanes::LaneBatches;
 use crate::flow::coupled::rows::{
     ComponentPlace, EquationRow, EquationTable, FormulaInput, RowAggregate, VariableSource,
 };
+use crate::flow::coupled::sections::Section;
 use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::prefetch::prefetch;
@@ -29,6 +30,8 @@ pub struct System {
     pub modules: u64,
     /// The rates are there in batches only, the table has no rows.
     pub is_bare: bool,
+    /// The same equations in sections, where several threads evaluate them: then `lanes` has none.
+    pub sections: Vec<Section>,
 }
 
 /// More modules than this are not likely to be in the processor's caches.
@@ -65,6 +68,7 @@ impl System {
     pub fn rebuild(&mut self, rules: &[Rule], modules: &Membership, unknown: impl Fn(u32) -> Option<u32>) {
         self.table.clear(modules.start);
         self.is_bare = false;
+        self.sections.clear();
         self.table.rows.reserve_exact(modules.members.len());
         for (at, &id) in modules.members.iter().enumerate() {
             // The modules of a region have just been visited.
@@ -99,6 +103,7 @@ impl System {
     /// Moves the start of the step, from which time is counted.
     pub fn advance(&mut self, start: SimTime) {
         self.table.advance(start);
+        self.sections.iter_mut().for_each(|section| section.advance(start));
     }
 
     /// The module, and its parameter, that a component belongs to.
