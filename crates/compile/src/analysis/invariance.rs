@@ -12,6 +12,7 @@
 //! surface counts as reachable.
 
 use super::form::{Bounded, Form, Indeterminates, forms};
+use super::zeros::{is_only_zero, with_same_zeros};
 use dlsys_expr::{Binary, Dual, Graph, NodeId, Program};
 use dlsys_tree::mix;
 
@@ -61,7 +62,8 @@ pub fn never_reached(
     let pivots: Vec<u32> = read.into_iter().filter(|v| moves(*v)).collect();
     pivots.into_iter().any(|pivot| {
         let (bend, slope) = (graph.derivative(rate, pivot), graph.derivative(gap, pivot));
-        let surface = Surface { graph, gap, slope, rate, bend, pivot, variables };
+        let plain = with_same_zeros(graph, gap, pivot);
+        let surface = Surface { graph, gap, plain, slope, rate, bend, pivot, variables };
         let still: Vec<u32> = graph.variables(&[gap, rate]).into_iter().filter(|v| stands(*v)).collect();
         surface.is_invariant(&still, time + 2)
     })
@@ -71,6 +73,8 @@ pub fn never_reached(
 struct Surface<'g> {
     graph: &'g Graph,
     gap: NodeId,
+    /// An expression with the zeros of the difference, at least.
+    plain: NodeId,
     slope: NodeId,
     rate: NodeId,
     bend: NodeId,
@@ -126,13 +130,15 @@ impl Surface<'_> {
         Some(rate.vanishes() && !slope.vanishes() && slope.is_finite() && bend.is_finite())
     }
 
-    /// The zero of the difference as a function of the only parameter in it that changes (Newton's method).
+    /// The zero of the difference as a function of the only parameter in it that changes (Newton's method), if it is shown to have no other: the
+    /// surface is then all of `a = b`, and not one sheet of it.
     fn root(&self, point: &[f64], still: &[u32]) -> Option<Bounded> {
         let read = self.graph.variables(&[self.gap]);
         if !read.iter().all(|v| *v == self.pivot || still.contains(v)) {
             return None;
         }
-        let program = Program::compile(self.graph, &[self.gap], self.variables);
+        let [program, alone] =
+            [self.gap, self.plain].map(|gap| Program::compile(self.graph, &[gap], self.variables));
         let mut duals: Vec<Dual<f64>> = point.iter().map(|&value| Dual { value, rate: 0.0 }).collect();
         let mut scratch = Vec::new();
         let pivot = self.pivot as usize;
@@ -148,7 +154,9 @@ impl Surface<'_> {
                 let x = duals[pivot].value - step;
                 duals[pivot].value = x;
                 if step.abs() <= 4.0 * f64::EPSILON * x.abs() {
-                    return Some(Bounded { value: x, error: 4.0 * f64::EPSILON * x.abs() + step.abs() });
+                    let only = is_only_zero(&alone, point, pivot, x);
+                    let error = 4.0 * f64::EPSILON * x.abs() + step.abs();
+                    return only.then_some(Bounded { value: x, error });
                 }
             }
         }

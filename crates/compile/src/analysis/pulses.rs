@@ -13,6 +13,7 @@ use dlsys_model::{Kinds, Pattern, PulseTerms, Pulses, SolutionForm};
 
 use super::RuleAnalysis;
 use super::variability::Moving;
+use crate::comparisons::{Moves, has_steps};
 use crate::declared::{DeclaredSolve, ResolvedRule};
 
 /// The variation of a parameter between the stages of a step.
@@ -99,8 +100,14 @@ impl Surroundings<'_> {
             .filter(|(_, term)| clause.varies(graph, *term, true))
             .map(|(i, _)| (declared.first_aggregate + i) as u32)
             .collect();
-        let finder =
-            Finder { clause: &clause, hazy: &hazy, total: declared.variables + solve.switches.len() };
+        let moves = Moves { steady: &[], jumping: &[] };
+        let jumping: Vec<u32> = (declared.first_aggregate as u32..)
+            .zip(declared.terms())
+            .filter(|(_, term)| has_steps(graph, &[*term], &moves))
+            .map(|(variable, _)| variable)
+            .collect();
+        let total = declared.variables + solve.switches.len();
+        let finder = Finder { clause: &clause, hazy: &hazy, jumping: &jumping, total };
         let rates = |closed: bool| -> Vec<(usize, NodeId)> {
             let forms = solve.rates.iter().zip(solution_forms);
             forms.filter(|(_, form)| form.is_closed() == closed).map(|(rate, _)| *rate).collect()
@@ -118,6 +125,8 @@ struct Finder<'c> {
     clause: &'c Clause<'c>,
     /// The variables of aggregates that may have pulses.
     hazy: &'c [u32],
+    /// The variables of aggregates of what jumps.
+    jumping: &'c [u32],
     /// The number of variables that the expressions read.
     total: usize,
 }
@@ -165,6 +174,7 @@ impl Finder<'_> {
         PulseTerms {
             terms: Program::compile(graph, &all, self.total),
             outer: outer.len(),
+            jumping: all.iter().map(|term| self.jumps(graph, *term)).collect(),
             disturbed: Program::compile(graph, &disturbed, self.total + all.len()),
             parameters: owners.collect(),
             explicit: expressions.len(),
@@ -200,6 +210,11 @@ impl Finder<'_> {
     fn has(&self, graph: &mut Graph, term: NodeId, by_pace: bool) -> bool {
         graph.variables(&[term]).iter().any(|v| self.hazy.contains(v))
             || self.clause.varies(graph, term, by_pace)
+    }
+
+    /// True if a term jumps where the aggregates that it reads do.
+    fn jumps(&self, graph: &Graph, term: NodeId) -> bool {
+        !self.jumping.is_empty() && graph.variables(&[term]).iter().any(|v| self.jumping.contains(v))
     }
 
     /// The terms of all sums in some expressions.
