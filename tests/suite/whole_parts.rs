@@ -208,28 +208,3 @@ proptest! {
         prop_assert!((found - expected).abs() < 2e-5 * expected.abs().max(1.0), "{:?}: {}, not {}\n{}", method, found, expected, text);
     }
 }
-
-/// Where the rate of what jumps vanishes with it, one zero of `sin(π w/2)` is a limit, and the others are not.
-#[test]
-fn only_one_of_many_zeros_is_a_limit() {
-    let ten = (1..=10).fold(0.0, |sum, k| sum + 3.0 - f64::ln(2.0 * f64::from(k)));
-    for method in [Method::Auto, Method::Dopri5, Method::Radau] {
-        let of = |text: &str, end: f64| {
-            let strings = run(text, Settings { method, ..Settings::default() }, &[end]);
-            strings.unwrap_or_else(|error| panic!("{method:?}: {error}\n{text}")).remove(0)
-        };
-        let z = of("initial string: B(0, 1)\nB(z, w): solve dw/dt = w, dz/dt = floor(w/2)", 3.0)[0].1[0];
-        assert!((z - ten).abs() < 1e-4, "{method:?}: {z}, not {ten}");
-        let v = of("initial string: B(1, 0)\nB(w, v): solve dw/dt = w, v = floor(w/2)", 1.2)[0].1[1];
-        assert!((v - 1.0).abs() < 1e-9, "{method:?}: {v}");
-        let string = of("initial string: A(1)\nA(w):\n  solve dw/dt = w\n  if w^2 >= 3*w produce C(w)", 3.0);
-        assert_eq!(string[0].0, "C", "{method:?}");
-        assert!((string[0].1[0] - 3.0).abs() < 1e-9, "{method:?}: {string:?}");
-        // The only zero of w/(1 + w) - 1/2 is the limit.
-        let string = of(
-            "initial string: A(0.1)\nA(w):\n  solve dw/dt = w*(1 - w)\n  if w/(1 + w) >= 0.5 produce C(w)",
-            50.0,
-        );
-        assert_eq!(string[0].0, "A", "{method:?}");
-    }
-}

@@ -1,55 +1,105 @@
-//! The proof that an expression of one variable has no zero but the one that is known.
+//! All zeros of an expression of one variable.
 //!
-//! The whole line is cut into pieces. Bounds of the expression exclude zero on a piece, or those of its slope show that it is monotone on the piece with
-//! the known zero. `sin(w)` has other zeros, and so has `w*w - 3*w`: nothing that is found at one of them tells about the others.
+//! The whole line is cut into pieces. Bounds of the expression exclude zero on a piece, or those of its slope show that it is monotone there, so that its
+//! ends tell. `sin(w)` has too many zeros, and `w*w - 3*w` has two: nothing that is found at one of them tells about the others.
 
+use super::form::Bounded;
 use dlsys_expr::{Binary, Dual, Graph, Interval, Node, NodeId, Program, Scratch, Unary, Value};
 
 /// Most pieces of the line that are examined.
 const MAX_PIECES: usize = 1000;
+/// Most zeros that are looked for.
+const MAX_ZEROS: usize = 16;
+/// The first cut of the line: no number that is a zero of what people write.
+const FIRST_CUT: f64 = -0.731_058_578_630_004_9;
 
-/// The zero is far from other places by as much as this, at least, in the first pieces.
-const LEAST_SIZE: f64 = 1e-3;
-
-/// True if an expression is shown to have no zero but this one, as a function of the variable `pivot`; `point` gives the values of the others.
-pub(super) fn is_only_zero(expression: &Program, point: &[f64], pivot: usize, zero: f64) -> bool {
+/// Pieces of the line with one zero each, of an expression as a function of the variable `pivot`; `point` gives the values of the others. None if some
+/// zero may not be in them.
+pub(super) fn pieces_with_a_zero(
+    expression: &Program,
+    point: &[f64],
+    pivot: usize,
+) -> Option<Vec<(f64, f64)>> {
     let mut along: Vec<Dual<Interval>> = point.iter().map(|&value| Dual::constant(value)).collect();
     let mut scratch = Scratch::default();
-    let mut open = vec![(f64::NEG_INFINITY, f64::INFINITY)];
-    for _ in 0..MAX_PIECES {
-        let Some((lo, hi)) = open.pop() else { return true };
+    let mut over = |lo: f64, hi: f64| {
         along[pivot] = Dual { value: Interval::spanned(lo, hi), rate: Interval::constant(1.0) };
         let mut out = [Dual::constant(0.0)];
         expression.eval(&along, &mut scratch, &mut out);
-        let [Dual { value, rate }] = out;
-        let has_none = value.is_empty() || value.lo > 0.0 || value.hi < 0.0;
-        let is_monotone = !rate.partial && (rate.lo > 0.0 || rate.hi < 0.0);
-        if has_none || is_monotone && lo < zero && zero < hi {
+        out[0]
+    };
+    let mut open = vec![(FIRST_CUT, f64::INFINITY), (f64::NEG_INFINITY, FIRST_CUT)];
+    let mut found: Vec<(f64, f64)> = Vec::new();
+    for _ in 0..MAX_PIECES {
+        let Some((lo, hi)) = open.pop() else { return Some(found) };
+        let Dual { value, rate } = over(lo, hi);
+        if value.is_empty() || value.lo > 0.0 || value.hi < 0.0 {
             continue;
         }
-        let middle = middle(lo, hi, zero);
-        if middle <= lo || middle >= hi {
-            return false;
+        let is_monotone = !rate.partial && (rate.lo > 0.0 || rate.hi < 0.0);
+        if is_monotone && lo.is_finite() && hi.is_finite() {
+            let [first, last] = [lo, hi].map(|at| over(at, at).value);
+            // A zero at an end belongs to the piece before it.
+            let at_first = first.lo == 0.0 && first.hi == 0.0;
+            if at_first || first.hi < 0.0 && last.hi < 0.0 || first.lo > 0.0 && last.lo > 0.0 {
+                continue;
+            }
+            if found.len() == MAX_ZEROS {
+                return None;
+            }
+            found.push((lo, hi));
+            continue;
         }
-        open.extend([(lo, middle), (middle, hi)]);
+        let middle = match (lo.is_finite(), hi.is_finite()) {
+            (true, false) => 2.0 * lo.max(0.5),
+            (false, true) => 2.0 * hi.min(-0.5),
+            _ => 0.5 * (lo + hi),
+        };
+        if middle <= lo || middle >= hi || !middle.is_finite() {
+            return None;
+        }
+        open.extend([(middle, hi), (lo, middle)]);
     }
-    false
+    None
 }
 
-/// A place at which a piece of the line is cut: beside the zero, not at it.
-fn middle(lo: f64, hi: f64, zero: f64) -> f64 {
-    let size = zero.abs().max(LEAST_SIZE);
-    let holds_zero = lo < zero && zero < hi;
-    match (lo.is_finite(), hi.is_finite()) {
-        (false, false) => zero - size,
-        (true, false) if holds_zero => zero + size,
-        (true, false) => lo + (lo - zero),
-        (false, true) if holds_zero => zero - size,
-        (false, true) => hi - (zero - hi),
-        (true, true) if holds_zero && zero - lo > hi - zero => 0.5 * (lo + zero),
-        (true, true) if holds_zero => 0.5 * (zero + hi),
-        (true, true) => 0.5 * (lo + hi),
+/// The zero in such a piece, by Newton's method from its middle; None if that does not find it.
+pub(super) fn zero_in(
+    expression: &Program,
+    point: &[f64],
+    pivot: usize,
+    (lo, hi): (f64, f64),
+) -> Option<Bounded> {
+    let mut duals: Vec<Dual<f64>> = point.iter().map(|&value| Dual { value, rate: 0.0 }).collect();
+    let mut scratch = Vec::new();
+    let (mut lo, mut hi, mut x) = (lo, hi, 0.5 * (lo + hi));
+    let mut at = |x: f64| {
+        duals[pivot] = Dual { value: x, rate: 1.0 };
+        let mut out = [Dual { value: 0.0, rate: 0.0 }];
+        expression.eval(&duals, &mut scratch, &mut out);
+        out[0]
+    };
+    let rises = at(lo).value < at(hi).value;
+    for _ in 0..200 {
+        let Dual { value, rate } = at(x);
+        let step = value / rate;
+        if !step.is_finite() {
+            return None;
+        }
+        if step.abs() <= 4.0 * f64::EPSILON * x.abs() {
+            let value = x - step;
+            return Some(Bounded { value, error: 4.0 * f64::EPSILON * value.abs() + step.abs() });
+        }
+        if (value < 0.0) == rises {
+            lo = x
+        } else {
+            hi = x
+        }
+        // Where Newton's method leaves what is known, the middle of that is tried.
+        let next = x - step;
+        x = if lo < next && next < hi { next } else { 0.5 * (lo + hi) };
     }
+    None
 }
 
 /// An expression that is zero wherever the given one is, of which bounds tell more: the numerator of a quotient of polynomials, in the form of Horner.
@@ -98,39 +148,30 @@ fn quotient(graph: &mut Graph, root: NodeId, pivot: u32) -> (NodeId, NodeId) {
 mod tests {
     use super::*;
 
-    fn only(make: impl Fn(&mut Graph, NodeId) -> NodeId, zero: f64) -> bool {
+    fn zeros(make: impl Fn(&mut Graph, NodeId) -> NodeId) -> Option<Vec<f64>> {
         let mut graph = Graph::default();
         let x = graph.var(0);
         let expression = make(&mut graph, x);
         let plain = with_same_zeros(&mut graph, expression, 0);
-        is_only_zero(&Program::compile(&graph, &[plain], 1), &[f64::NAN], 0, zero)
+        let [given, plain] = [expression, plain].map(|root| Program::compile(&graph, &[root], 1));
+        let pieces = pieces_with_a_zero(&plain, &[f64::NAN], 0)?;
+        pieces.into_iter().map(|piece| Some(zero_in(&given, &[f64::NAN], 0, piece)?.value)).collect()
     }
 
     #[test]
-    fn other_zeros_are_seen() {
-        let half = |g: &mut Graph, x| {
-            let two = g.constant(2.0);
-            let half = g.binary(Binary::Div, x, two);
-            g.unary(Unary::SinPi, half)
-        };
-        assert!(!only(half, 0.0));
+    fn all_zeros_are_found() {
         let product = |g: &mut Graph, x| {
             let three = g.constant(3.0);
             let (square, times) = (g.binary(Binary::Mul, x, x), g.binary(Binary::Mul, three, x));
             g.binary(Binary::Sub, square, times)
         };
-        assert!(!only(product, 0.0) && !only(product, 3.0));
-        // Far away: x = 1e9.
+        assert_eq!(zeros(product), Some(vec![0.0, 3.0]));
         let far = |g: &mut Graph, x| {
             let (one, end) = (g.constant(1.0), g.constant(1e9));
             let (near, far) = (g.binary(Binary::Sub, x, one), g.binary(Binary::Sub, end, x));
             g.binary(Binary::Mul, near, far)
         };
-        assert!(!only(far, 1.0));
-    }
-
-    #[test]
-    fn one_zero_is_shown_to_be_the_only_one() {
+        assert_eq!(zeros(far), Some(vec![1.0, 1e9]));
         let cubic = |g: &mut Graph, x| {
             let two = g.constant(2.0);
             let square = g.binary(Binary::Mul, x, x);
@@ -138,20 +179,36 @@ mod tests {
             let sum = g.binary(Binary::Add, cube, x);
             g.binary(Binary::Sub, sum, two)
         };
-        assert!(only(cubic, 1.0));
-        // x/(1 + x) = 1/2.
+        assert_eq!(zeros(cubic), Some(vec![1.0]));
+        // x/(1 + x) = 1/2, |x| = 1, exp(-x) = exp(-1).
         let saturated = |g: &mut Graph, x| {
             let (one, half) = (g.constant(1.0), g.constant(0.5));
             let below = g.binary(Binary::Add, one, x);
             let part = g.binary(Binary::Div, x, below);
             g.binary(Binary::Sub, part, half)
         };
-        assert!(only(saturated, 1.0));
+        assert_eq!(zeros(saturated), Some(vec![1.0]));
+        let size = |g: &mut Graph, x| {
+            let (one, size) = (g.constant(1.0), g.unary(Unary::Abs, x));
+            g.binary(Binary::Sub, size, one)
+        };
+        assert_eq!(zeros(size), Some(vec![-1.0, 1.0]));
         let decay = |g: &mut Graph, x| {
             let (minus, level) = (g.unary(Unary::Neg, x), g.constant((-1f64).exp()));
             let decay = g.unary(Unary::Exp, minus);
             g.binary(Binary::Sub, decay, level)
         };
-        assert!(only(decay, 1.0));
+        assert_eq!(zeros(decay), Some(vec![1.0]));
+    }
+
+    #[test]
+    fn without_an_end_of_zeros_nothing_is_said() {
+        let half = |g: &mut Graph, x| {
+            let two = g.constant(2.0);
+            let half = g.binary(Binary::Div, x, two);
+            g.unary(Unary::SinPi, half)
+        };
+        assert_eq!(zeros(half), None);
+        assert_eq!(zeros(|g, x| g.binary(Binary::Mul, x, x)), None);
     }
 }
