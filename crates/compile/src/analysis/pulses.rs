@@ -179,8 +179,10 @@ impl Finder<'_> {
         }
         let all: Vec<NodeId> = outer.iter().map(|(_, term)| *term).chain(inner).collect();
         let owners = expressions.iter().map(|e| e.0).chain(equations.iter().map(|e| e.0));
+        let terms = Program::compile(graph, &all, self.total);
         PulseTerms {
-            terms: Program::compile(graph, &all, self.total),
+            reads: (0..all.len()).map(|term| terms.output_reads(term)).collect(),
+            terms,
             outer: outer.len(),
             jumping: all.iter().map(|term| self.jumps(graph, *term)).collect(),
             disturbed: Program::compile(graph, &disturbed, self.total + all.len()),

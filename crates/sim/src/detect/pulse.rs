@@ -112,6 +112,8 @@ pub struct PulseDetector {
     /// The range of each term at the positions that have been sampled.
     ranges: Vec<Interval>,
     sampled: Sampled,
+    /// By term: true if it is compared with its size and not with its change.
+    stiff: Vec<bool>,
     values: Vec<f64>,
     bounds: Vec<Interval>,
     out: Vec<f64>,
@@ -231,7 +233,17 @@ impl PulseDetector {
         self.ranges.clear();
         self.ranges.resize(all.terms.terms.outputs(), Interval::EMPTY);
         self.sampled = Sampled::Nowhere;
+        self.note_stiff(all);
         along(all.step, |path, part| self.halve(all, path, part))
+    }
+
+    /// Notes for which terms the rates of two states a tolerance apart may differ by any amount: those of what is integrated under stiff equations.
+    fn note_stiff(&mut self, all: &Examination) {
+        let ExaminedStep { world, state, rule, start, own, .. } = *all.step;
+        let path = Path::of_equations(world, state, rule, (start, 0.0), own);
+        let is_stiff = |reads: &Vec<usize>| all.step.conditions.stiff && path.is_integrated(reads);
+        self.stiff.clear();
+        self.stiff.extend(all.terms.reads.iter().map(is_stiff));
     }
 
     /// Includes the values of terms at the ends or the stages of a step in their ranges.
@@ -325,12 +337,9 @@ impl PulseDetector {
     fn is_surprised(&mut self, all: &Examination, path: &Path, part: f64, (lo, hi): (f64, f64)) -> bool {
         let (share, tolerance) = (part * (hi - lo), all.step.conditions.tolerance);
         (0..self.bounds_out.len()).any(|term| {
-            let bounds = self.bounds_out[term];
+            let (bounds, is_stiff) = (self.bounds_out[term], self.stiff[term]);
             let is_outer = term < all.terms.outer && all.reader.is_none();
-            if is_outer
-                && (bounds.hi - bounds.lo).max(0.0) * all.scale * share <= tolerance
-                && !all.step.conditions.stiff
-            {
+            if is_outer && (bounds.hi - bounds.lo).max(0.0) * all.scale * share <= tolerance && !is_stiff {
                 return false;
             }
             if !is_outer && !bounds.magnitude().is_finite() {
@@ -341,8 +350,8 @@ impl PulseDetector {
             for sampled in [Sampled::Ends, Sampled::Stages] {
                 self.sample(all, sampled);
                 let range = self.ranges[term];
-                let usual = if all.step.conditions.stiff { range.magnitude() } else { range.hi - range.lo };
-                excess = match all.step.conditions.stiff {
+                let usual = if is_stiff { range.magnitude() } else { range.hi - range.lo };
+                excess = match is_stiff {
                     true => (bounds.hi.max(0.0), (-bounds.lo).max(0.0)),
                     false => (bounds.hi - range.hi, range.lo - bounds.lo),
                 };
