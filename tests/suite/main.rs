@@ -54,6 +54,7 @@ mod scenes;
 mod schedulers;
 mod semantics;
 mod settled;
+mod several_places;
 mod shadows;
 mod sheets;
 mod signals;

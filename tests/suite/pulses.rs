@@ -282,3 +282,46 @@ fn pulses_after_events_of_neighbours_are_seen() {
         }
     }
 }
+
+/// Two steps between two stages: each differs at the stages as much as anywhere, and only their difference is short.
+#[test]
+fn two_steps_that_come_and_go_are_seen_together() {
+    for n in 0..40 {
+        let (start, length) = (0.5 + (f64::from(n) * 7.31) % 8.0, [1.0, 0.4, 0.1, 0.03][n as usize % 4]);
+        let (end, edge) = (start + length, length / 15.0);
+        let tanh = format!("tanh((t - {start:?})/{edge:?}) - tanh((t - {end:?})/{edge:?})");
+        let models = [
+            (format!("initial string: A(0)\nA(x): solve dx/dt = {tanh}"), 2.0 * length),
+            (
+                format!(
+                    "initial string: A(0)\nA(x): solve dx/dt = 1/(1 + exp(-(t - {start:?})/{edge:?})) - 1/(1 + exp(-(t - {end:?})/{edge:?}))"
+                ),
+                length,
+            ),
+            (format!("initial string: A(0)\nA(x): solve dx/dt = exp({tanh}) - 1"), f64::NAN),
+            (
+                format!(
+                    "initial string: B(0, 0) A(0)\nB(y, v): solve dy/dt = 0.1*y, v = {tanh}\nB(y, v) < A(x): solve dx/dt = v"
+                ),
+                2.0 * length,
+            ),
+        ];
+        for (text, exact) in models {
+            let exact = if exact.is_nan() {
+                // A sum of the midpoints, of what is not 0 far from its edges.
+                let (from, to, many) = (start - 1.0, end + 1.0, 20_000);
+                let h = (to - from) / f64::from(many);
+                let at = |t: f64| (((t - start) / edge).tanh() - ((t - end) / edge).tanh()).exp_m1();
+                (0..many).map(|i| h * at(from + (f64::from(i) + 0.5) * h)).sum()
+            } else {
+                exact
+            };
+            for method in [Method::Auto, Method::Dopri5, Method::Radau] {
+                let strings = run(&text, Settings { method, ..Settings::default() }, &[10.5]);
+                let string = strings.unwrap_or_else(|error| panic!("{method:?}: {error}\n{text}")).remove(0);
+                let x = string.last().expect("it lives").1[0];
+                assert!((x - exact).abs() < 1e-4 * exact, "{method:?}: {x}, not {exact}, of\n{text}");
+            }
+        }
+    }
+}

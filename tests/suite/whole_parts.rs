@@ -144,3 +144,67 @@ proptest! {
         prop_assert!((found[0] - x).abs() < 1e-4 * x.max(1.0) && found[3] == n, "{:?}, not {}, {}\n{}", found, x, n, text);
     }
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn rates_and_productions_may_ask_for_the_same_of_a_neighbour(
+        (condition, holds) in prop::sample::select(vec![
+            ("floor(y) - 2*floor(y/2) = 0", (|f| f.rem_euclid(2.0) == 0.0) as fn(f64) -> bool),
+            ("floor(y) - 3*floor(y/3) = 1", |f| f.rem_euclid(3.0) == 1.0),
+            ("floor(y)^2 = 1", |f| f.abs() == 1.0),
+        ]),
+        start in -4.0..4.0f64, speed in prop_oneof![-1.3..-0.4f64, 0.4..1.3f64], method in 0..3usize,
+    ) {
+        let end = 3.0;
+        let (mut x, mut n, mut state) = (0.0, 0.0, false);
+        for t in times_of_whole_numbers(start, speed, end).windows(2) {
+            let now = holds(sinh(start, speed, 0.5 * (t[0] + t[1])).floor());
+            x += (t[1] - t[0]) * if now { 2.0 } else { 1.0 };
+            n += f64::from(u8::from(std::mem::replace(&mut state, now) != now));
+        }
+        let text = format!(
+            "initial string: B({start:?}) A(0, 0, 0)\nB(y): solve dy/dt = {speed:?}*sqrt(1 + y^2)\nB(y) < A(x, s, n):\n  solve dx/dt = if {condition} then 2 else 1\n  \
+             if s = 0 & {condition} produce A(x, 1, n + 1)\n  if s = 1 & !({condition}) produce A(x, 0, n + 1)"
+        );
+        let method = [Method::Auto, Method::Dopri5, Method::Radau][method];
+        let strings = run(&text, Settings { method, ..Settings::default() }, &[end]);
+        let string = strings.unwrap_or_else(|error| panic!("{method:?}: {error}\n{text}")).remove(0);
+        let found = &string[1].1;
+        prop_assert!((found[0] - x).abs() < 1e-4 * x.max(1.0) && found[2] == n, "{:?}: {:?}, not {} {}\n{}", method, found, x, n, text);
+    }
+
+    #[test]
+    fn sums_of_what_jumps_are_those_of_the_present_parts(
+        starts in prop::collection::vec((-3.0..3.0f64, prop_oneof![-1.1..-0.2f64, 0.2..1.1f64]), 1..4),
+        (term, of) in prop::sample::select(vec![
+            ("sum(M(w, r): floor(w))", (|f| f.iter().sum()) as fn(&[f64]) -> f64),
+            ("largest(M(w, r): floor(w))", |f| f.iter().copied().fold(f64::NEG_INFINITY, f64::max)),
+            ("sum(M(w, r): floor(w) - 2*floor(w/2))", |f| f.iter().map(|f| f.rem_euclid(2.0)).sum()),
+            ("sum(M(w, r): if w >= 1 then 1 else 0)", |f| f.iter().filter(|f| **f >= 1.0).count() as f64),
+        ]),
+        integrated in prop::bool::ANY, method in 0..3usize,
+    ) {
+        let end = 3.0;
+        let at = |(start, speed): (f64, f64), t: f64| if integrated { sinh(start, speed, t) } else { start + speed * t };
+        let times_of = |start: f64, speed: f64| match integrated {
+            true => times_of_whole_numbers(start, speed, end),
+            false => (-7..8).map(|whole| (f64::from(whole) - start) / speed).chain([0.0, end]).filter(|t| (0.0..=end).contains(t)).collect(),
+        };
+        let mut times: Vec<f64> = starts.iter().flat_map(|(start, speed)| times_of(*start, *speed)).collect();
+        times.sort_by(f64::total_cmp);
+        let mut expected = 0.0;
+        for t in times.windows(2) {
+            let parts: Vec<f64> = starts.iter().map(|one| at(*one, 0.5 * (t[0] + t[1])).floor()).collect();
+            expected += (t[1] - t[0]) * of(&parts);
+        }
+        let attached: Vec<String> = starts.iter().map(|(start, speed)| format!("[ M({start:?}, {speed:?}) ]")).collect();
+        let flow = if integrated { "r*sqrt(1 + w^2)" } else { "r" };
+        let text = format!("initial string: Q(0) {}\nQ(x): solve dx/dt = {term}\nM(w, r): solve dw/dt = {flow}", attached.join(" "));
+        let method = [Method::Auto, Method::Dopri5, Method::Radau][method];
+        let strings = run(&text, Settings { method, ..Settings::default() }, &[end]);
+        let string = strings.unwrap_or_else(|error| panic!("{method:?}: {error}\n{text}")).remove(0);
+        let found = string[0].1[0];
+        prop_assert!((found - expected).abs() < 2e-5 * expected.abs().max(1.0), "{:?}: {}, not {}\n{}", method, found, expected, text);
+    }
+}

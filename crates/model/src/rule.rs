@@ -203,6 +203,10 @@ pub struct PulseTerms {
     pub terms: Program,
     /// The number of terms of the first sort: an expression changes by as much as such a term does.
     pub outer: usize,
+    /// By term: the variables that it reads.
+    pub reads: Vec<Vec<usize>>,
+    /// By term: true if it reads an aggregate of what jumps. What jumps elsewhere in equations is frozen ([`Switch`]).
+    pub jumping: Vec<bool>,
     /// The expressions, with one more variable for each term behind all others, which is added to that term. In place of g, which are the last, stands an
     /// estimate of the change of the unknown: g divided by the sizes of its partial derivatives.
     pub disturbed: Program,

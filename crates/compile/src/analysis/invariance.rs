@@ -12,7 +12,8 @@
 //! surface counts as reachable.
 
 use super::form::{Bounded, Form, Indeterminates, forms};
-use dlsys_expr::{Binary, Dual, Graph, NodeId, Program};
+use super::zeros::{pieces_with_a_zero, with_same_zeros, zero_in};
+use dlsys_expr::{Binary, Graph, NodeId, Program};
 use dlsys_tree::mix;
 
 /// Number of points at which the rate is tested, if there are constant parameters.
@@ -61,7 +62,8 @@ pub fn never_reached(
     let pivots: Vec<u32> = read.into_iter().filter(|v| moves(*v)).collect();
     pivots.into_iter().any(|pivot| {
         let (bend, slope) = (graph.derivative(rate, pivot), graph.derivative(gap, pivot));
-        let surface = Surface { graph, gap, slope, rate, bend, pivot, variables };
+        let plain = with_same_zeros(graph, gap, pivot);
+        let surface = Surface { graph, gap, plain, slope, rate, bend, pivot, variables };
         let still: Vec<u32> = graph.variables(&[gap, rate]).into_iter().filter(|v| stands(*v)).collect();
         surface.is_invariant(&still, time + 2)
     })
@@ -71,6 +73,8 @@ pub fn never_reached(
 struct Surface<'g> {
     graph: &'g Graph,
     gap: NodeId,
+    /// An expression with the zeros of the difference, at least.
+    plain: NodeId,
     slope: NodeId,
     rate: NodeId,
     bend: NodeId,
@@ -107,16 +111,34 @@ impl Surface<'_> {
         let Some(gap) = forms(self.graph, &[self.gap], &fixed, &mut all) else { return Some(false) };
         // The equation of the surface: the parameter in terms of all others, or as a number.
         let linear = gap[0].solved_for(number).filter(|(slope, _)| !slope.may_be_zero());
-        let place = match linear.and_then(|(slope, rest)| rest.over(slope)?.scaled(Bounded::exactly(-1.0))) {
-            Some(place) => place,
-            None => Form::number(self.root(point, still)?),
+        let places = match linear.and_then(|(slope, rest)| rest.over(slope)?.scaled(Bounded::exactly(-1.0))) {
+            Some(place) => vec![place],
+            // A surface of several sheets is as good as the worst of them.
+            None => self.roots(point, still)?.into_iter().map(Form::number).collect(),
         };
+        let mut vanishes = None;
+        for place in places {
+            vanishes = self.vanishes_on(&place, &fixed, &mut all);
+            if vanishes != Some(true) {
+                break;
+            }
+        }
+        vanishes
+    }
+
+    /// The same on one sheet of the surface, where the pivot is this.
+    fn vanishes_on(
+        &self,
+        place: &Form,
+        fixed: &dyn Fn(u32) -> Option<Form>,
+        all: &mut Indeterminates,
+    ) -> Option<bool> {
         if !place.is_finite() {
             return None;
         }
         let on_surface = |v: u32| if v == self.pivot { Some(place.clone()) } else { fixed(v) };
         let roots = [self.rate, self.bend, self.slope];
-        let Some(found) = forms(self.graph, &roots, &on_surface, &mut all) else { return Some(false) };
+        let Some(found) = forms(self.graph, &roots, &on_surface, all) else { return Some(false) };
         let [rate, bend, slope] = &found[..] else { return Some(false) };
         if !rate.is_finite() {
             return None;
@@ -126,33 +148,17 @@ impl Surface<'_> {
         Some(rate.vanishes() && !slope.vanishes() && slope.is_finite() && bend.is_finite())
     }
 
-    /// The zero of the difference as a function of the only parameter in it that changes (Newton's method).
-    fn root(&self, point: &[f64], still: &[u32]) -> Option<Bounded> {
+    /// All zeros of the difference as a function of the only parameter in it that changes; None if some may be missing.
+    fn roots(&self, point: &[f64], still: &[u32]) -> Option<Vec<Bounded>> {
         let read = self.graph.variables(&[self.gap]);
         if !read.iter().all(|v| *v == self.pivot || still.contains(v)) {
             return None;
         }
-        let program = Program::compile(self.graph, &[self.gap], self.variables);
-        let mut duals: Vec<Dual<f64>> = point.iter().map(|&value| Dual { value, rate: 0.0 }).collect();
-        let mut scratch = Vec::new();
+        let [gap, plain] =
+            [self.gap, self.plain].map(|gap| Program::compile(self.graph, &[gap], self.variables));
         let pivot = self.pivot as usize;
-        for start in [1.0, 0.1, 10.0, -1.0] {
-            duals[pivot] = Dual { value: start, rate: 1.0 };
-            for _ in 0..60 {
-                let mut out = [Dual { value: 0.0, rate: 0.0 }];
-                program.eval(&duals, &mut scratch, &mut out);
-                let step = out[0].value / out[0].rate;
-                if !step.is_finite() {
-                    break;
-                }
-                let x = duals[pivot].value - step;
-                duals[pivot].value = x;
-                if step.abs() <= 4.0 * f64::EPSILON * x.abs() {
-                    return Some(Bounded { value: x, error: 4.0 * f64::EPSILON * x.abs() + step.abs() });
-                }
-            }
-        }
-        None
+        let pieces = pieces_with_a_zero(&plain, point, pivot)?;
+        pieces.into_iter().map(|piece| zero_in(&gap, point, pivot, piece)).collect()
     }
 }
 

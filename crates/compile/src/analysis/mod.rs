@@ -24,6 +24,7 @@ mod rank;
 mod solution_forms;
 mod stepping;
 mod variability;
+mod zeros;
 
 use std::collections::HashMap;
 

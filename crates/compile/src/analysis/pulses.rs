@@ -13,6 +13,7 @@ use dlsys_model::{Kinds, Pattern, PulseTerms, Pulses, SolutionForm};
 
 use super::RuleAnalysis;
 use super::variability::Moving;
+use crate::comparisons::{Moves, has_steps};
 use crate::declared::{DeclaredSolve, ResolvedRule};
 
 /// The variation of a parameter between the stages of a step.
@@ -99,8 +100,14 @@ impl Surroundings<'_> {
             .filter(|(_, term)| clause.varies(graph, *term, true))
             .map(|(i, _)| (declared.first_aggregate + i) as u32)
             .collect();
-        let finder =
-            Finder { clause: &clause, hazy: &hazy, total: declared.variables + solve.switches.len() };
+        let moves = Moves { steady: &[], jumping: &[] };
+        let jumping: Vec<u32> = (declared.first_aggregate as u32..)
+            .zip(declared.terms())
+            .filter(|(_, term)| has_steps(graph, &[*term], &moves))
+            .map(|(variable, _)| variable)
+            .collect();
+        let total = declared.variables + solve.switches.len();
+        let finder = Finder { clause: &clause, hazy: &hazy, jumping: &jumping, total };
         let rates = |closed: bool| -> Vec<(usize, NodeId)> {
             let forms = solve.rates.iter().zip(solution_forms);
             forms.filter(|(_, form)| form.is_closed() == closed).map(|(rate, _)| *rate).collect()
@@ -118,6 +125,8 @@ struct Finder<'c> {
     clause: &'c Clause<'c>,
     /// The variables of aggregates that may have pulses.
     hazy: &'c [u32],
+    /// The variables of aggregates of what jumps.
+    jumping: &'c [u32],
     /// The number of variables that the expressions read.
     total: usize,
 }
@@ -135,9 +144,17 @@ impl Finder<'_> {
         let (mut outer, mut inner) = (Vec::new(), Vec::new());
         for (position, (_, node)) in expressions.iter().enumerate() {
             let found = summands(graph, *node, &|v| self.clause.moves(v as usize));
-            let found: Vec<NodeId> =
-                found.into_iter().filter(|term| self.has(graph, *term, by_pace)).collect();
-            outer.extend(found.into_iter().map(|term| (position, term)));
+            let found: Vec<(NodeId, bool)> =
+                found.into_iter().filter(|(term, _)| self.has(graph, *term, by_pace)).collect();
+            // Two of them may come and go between two stages that each alone differs between: `tanh(50*(t - 3)) - tanh(50*(t - 3.1))`.
+            if found.len() > 1 {
+                let zero = graph.constant(0.0);
+                let sum = found.iter().fold(zero, |sum, &(term, minus)| {
+                    graph.binary(if minus { Binary::Sub } else { Binary::Add }, sum, term)
+                });
+                outer.push((position, sum));
+            }
+            outer.extend(found.into_iter().map(|(term, _)| (position, term)));
         }
         let roots: Vec<NodeId> =
             expressions.iter().map(|e| e.1).chain(equations.iter().map(|e| e.1)).collect();
@@ -162,9 +179,12 @@ impl Finder<'_> {
         }
         let all: Vec<NodeId> = outer.iter().map(|(_, term)| *term).chain(inner).collect();
         let owners = expressions.iter().map(|e| e.0).chain(equations.iter().map(|e| e.0));
+        let terms = Program::compile(graph, &all, self.total);
         PulseTerms {
-            terms: Program::compile(graph, &all, self.total),
+            reads: (0..all.len()).map(|term| terms.output_reads(term)).collect(),
+            terms,
             outer: outer.len(),
+            jumping: all.iter().map(|term| self.jumps(graph, *term)).collect(),
             disturbed: Program::compile(graph, &disturbed, self.total + all.len()),
             parameters: owners.collect(),
             explicit: expressions.len(),
@@ -200,6 +220,11 @@ impl Finder<'_> {
     fn has(&self, graph: &mut Graph, term: NodeId, by_pace: bool) -> bool {
         graph.variables(&[term]).iter().any(|v| self.hazy.contains(v))
             || self.clause.varies(graph, term, by_pace)
+    }
+
+    /// True if a term jumps where the aggregates that it reads do.
+    fn jumps(&self, graph: &Graph, term: NodeId) -> bool {
+        !self.jumping.is_empty() && graph.variables(&[term]).iter().any(|v| self.jumping.contains(v))
     }
 
     /// The terms of all sums in some expressions.
@@ -277,28 +302,29 @@ fn without_factor(graph: &Graph, mut node: NodeId, moves: &dyn Fn(u32) -> bool) 
     }
 }
 
-/// The terms whose sum, up to signs, an expression is. Factors in which nothing moves are multiplied into them.
-fn summands(graph: &mut Graph, node: NodeId, moves: &dyn Fn(u32) -> bool) -> Vec<NodeId> {
+/// The terms whose sum an expression is, each with the truth of: it is subtracted. Factors in which nothing moves are multiplied into them.
+fn summands(graph: &mut Graph, node: NodeId, moves: &dyn Fn(u32) -> bool) -> Vec<(NodeId, bool)> {
     let rests = |graph: &Graph, node| !graph.variables(&[node]).into_iter().any(moves);
-    let (mut found, mut open) = (Vec::new(), vec![(node, None)]);
-    while let Some((node, factor)) = open.pop() {
+    let (mut found, mut open) = (Vec::new(), vec![(node, None, false)]);
+    while let Some((node, factor, minus)) = open.pop() {
         match graph.node(node) {
-            Node::Unary(Unary::Neg, a) => open.push((a, factor)),
-            Node::Binary(Binary::Add | Binary::Sub, a, b) => open.extend([(a, factor), (b, factor)]),
+            Node::Unary(Unary::Neg, a) => open.push((a, factor, !minus)),
+            Node::Binary(Binary::Add, a, b) => open.extend([(a, factor, minus), (b, factor, minus)]),
+            Node::Binary(Binary::Sub, a, b) => open.extend([(a, factor, minus), (b, factor, !minus)]),
             Node::Binary(Binary::Mul, a, b) if rests(graph, a) => {
                 let all = factor.map_or(a, |f| graph.binary(Binary::Mul, f, a));
-                open.push((b, Some(all)));
+                open.push((b, Some(all), minus));
             }
             Node::Binary(Binary::Mul, a, b) if rests(graph, b) => {
                 let all = factor.map_or(b, |f| graph.binary(Binary::Mul, f, b));
-                open.push((a, Some(all)));
+                open.push((a, Some(all), minus));
             }
             Node::Binary(Binary::Div, a, b) if rests(graph, b) => {
                 let one = factor.unwrap_or_else(|| graph.constant(1.0));
                 let all = graph.binary(Binary::Div, one, b);
-                open.push((a, Some(all)));
+                open.push((a, Some(all), minus));
             }
-            _ => found.push(factor.map_or(node, |f| graph.binary(Binary::Mul, f, node))),
+            _ => found.push((factor.map_or(node, |f| graph.binary(Binary::Mul, f, node)), minus)),
         }
     }
     found

@@ -23,6 +23,9 @@ const POLE: f64 = 1e8;
 /// Residue that numerical trajectories may leave of zero, relative to the size of the sides or to 1.
 const NOISE: f64 = 1e-10;
 
+/// A part of a path over which rates are known, but for the rounding of values.
+const INSTANT: f64 = 1e-6;
+
 /// What moves over a jump has left it for good when it has moved by so many times its rounding,
 const BLUR: f64 = 64.0;
 
@@ -265,7 +268,7 @@ impl CrossingDetector {
         let (mut from, mut tolerance) = (from, tolerance);
         let mut start = self.difference(path, atom).value(from);
         if path.rule.jumping_whole[atom] && sign != Sign::Any {
-            let behind = (from + self.blur(path, atom)).min(limit);
+            let behind = (from + self.blur(path, atom, from)).min(limit);
             if sign == Sign::Zero && start == 0.0 {
                 from = behind;
             } else if Sign::of(start) != sign {
@@ -296,7 +299,14 @@ impl CrossingDetector {
             Some(mut plain) => first_root(&mut plain, from, limit, sign, tolerance),
             None => first_root(&mut self.difference(path, atom), from, limit, sign, tolerance),
         };
-        let Root { position, at, after } = root?;
+        let Root { position, at, mut after } = root?;
+        let behind =
+            position + if path.rule.jumping_whole[atom] { self.blur(path, atom, position) } else { 0.0 };
+        if position < behind && behind < limit {
+            // Nearer to the jump rounding decides.
+            let then = self.difference(path, atom).value(behind);
+            after = if then.abs() <= tolerance { Sign::Zero } else { Sign::of(then) };
+        }
         let time = path.start.after(position * path.h);
         // At the end of a path what comes after may not be known.
         let passes = at == Sign::Zero && after != sign;
@@ -320,13 +330,14 @@ impl CrossingDetector {
         (variable <= path.rule.time_variable()).then_some((variable, level))
     }
 
-    /// The time, in units of the path's length, within which rounding may make something jump to and fro that moves over a jump: until every
-    /// value has moved by more than its rounding.
-    fn blur(&mut self, path: &Path, atom: usize) -> f64 {
-        path.departure(&mut self.departure);
-        let moves = path.rule.atom_reads[atom].iter().map(|variable| self.departure[*variable]);
-        let times =
-            moves.filter(|x| x.rate != 0.0).map(|x| BLUR * f64::EPSILON * x.value.abs() / x.rate.abs());
+    /// The time, in units of the path's length, within which rounding may make something jump to and fro that moves over a jump at a position: until
+    /// every value has moved by more than its rounding.
+    fn blur(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        let hi = (at + INSTANT).min(1.0);
+        path.over(hi - INSTANT, hi, &mut self.bounds);
+        let moves = path.rule.atom_reads[atom].iter().map(|variable| self.bounds[*variable]);
+        let moves = moves.map(|x| [x.value, x.rate].map(Interval::magnitude));
+        let times = moves.filter(|[_, rate]| *rate != 0.0).map(|[x, rate]| BLUR * f64::EPSILON * x / rate);
         let longest = LONGEST_BLUR * path.start.to_f64().abs().max(1.0) / path.h;
         times.fold(BLUR * path.start.resolution() / path.h, f64::max).min(longest)
     }

@@ -2,7 +2,7 @@
 //!
 //! - [`search`]: the next event of a module on a stretch. Begin here.
 //! - [`crossing`]: the crossings of one atom, by formula or by root isolation
-//! - [`doubt`]: crossings that the error of integration may hide or feign
+//! - [`doubt`]: crossings that the error of integration may hide or feign; [`limit`]: those that rounding feigns
 //! - [`quiet`]: a short test that spares most searches
 //! - [`pulse`]: rates that are large between the stages of a step; [`calm`]: a short test that spares most of that;
 //!   [`examined`]: what both are told of a step
@@ -12,6 +12,7 @@ pub mod calm;
 pub mod crossing;
 pub mod doubt;
 pub mod examined;
+mod limit;
 pub mod pulse;
 pub mod quiet;
 pub mod search;

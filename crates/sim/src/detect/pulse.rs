@@ -46,6 +46,12 @@ const BETWEEN: [f64; 2] = [0.16, 0.55];
 const NARROW: f64 = 1.0 / 256.0;
 /// Most pieces of a step that are examined.
 const MAX_PIECES: usize = 512;
+/// Pieces narrower than this part of a step, in which something jumps, are not halved any more.
+const INSTANT: f64 = 1e-9;
+/// Most pieces of a step that are examined for jumps.
+const MAX_PIECES_OF_JUMPS: usize = 4096;
+/// A jump is passed over by steps so short that it changes their ends by no more than this part of the tolerance.
+const JUMP: f64 = 1e-3;
 /// Most times that a step is cut for want of bounds: a part of 4^-20 of it is at the limit of resolution.
 pub const MAX_UNBOUNDED: usize = 20;
 
@@ -106,6 +112,8 @@ pub struct PulseDetector {
     /// The range of each term at the positions that have been sampled.
     ranges: Vec<Interval>,
     sampled: Sampled,
+    /// By term: true if it is compared with its size and not with its change.
+    stiff: Vec<bool>,
     values: Vec<f64>,
     bounds: Vec<Interval>,
     out: Vec<f64>,
@@ -225,7 +233,17 @@ impl PulseDetector {
         self.ranges.clear();
         self.ranges.resize(all.terms.terms.outputs(), Interval::EMPTY);
         self.sampled = Sampled::Nowhere;
+        self.note_stiff(all);
         along(all.step, |path, part| self.halve(all, path, part))
+    }
+
+    /// Notes for which terms the rates of two states a tolerance apart may differ by any amount: those of what is integrated under stiff equations.
+    fn note_stiff(&mut self, all: &Examination) {
+        let ExaminedStep { world, state, rule, start, own, .. } = *all.step;
+        let path = Path::of_equations(world, state, rule, (start, 0.0), own);
+        let is_stiff = |reads: &Vec<usize>| all.step.conditions.stiff && path.is_integrated(reads);
+        self.stiff.clear();
+        self.stiff.extend(all.terms.reads.iter().map(is_stiff));
     }
 
     /// Includes the values of terms at the ends or the stages of a step in their ranges.
@@ -253,10 +271,24 @@ impl PulseDetector {
     fn halve(&mut self, all: &Examination, path: &Path, part: f64) -> PulseFinding {
         let mut stack: SmallVec<[(f64, f64); 16]> = SmallVec::new();
         stack.push((0.0, 1.0));
-        let mut pieces = 0;
+        let (mut pieces, mut jumps) = (0, 0);
         while let Some(piece) = stack.pop() {
-            pieces += 1;
             self.bound(path, &all.terms.terms, piece);
+            if self.may_jump(all.terms) {
+                let (lo, hi) = piece;
+                let is_instant = (hi - lo) * part <= INSTANT;
+                if jumps > MAX_PIECES_OF_JUMPS || is_instant && self.jumps(all, path, piece) {
+                    // One that begins with a jump passes over it.
+                    return PulseFinding::Overlooked(if lo > 0.0 { lo } else { hi });
+                }
+                if !is_instant {
+                    jumps += 1;
+                    let middle = 0.5 * (lo + hi);
+                    stack.extend([(middle, hi), (lo, middle)]);
+                }
+                continue;
+            }
+            pieces += 1;
             if !self.is_surprised(all, path, part, piece) {
                 continue;
             }
@@ -281,16 +313,33 @@ impl PulseDetector {
         PulseFinding::Clear
     }
 
+    /// True if a term that reads aggregates of what jumps may do so over the piece whose bounds are known.
+    fn may_jump(&self, terms: &PulseTerms) -> bool {
+        terms.jumping.iter().zip(&self.bounds_out).any(|(jumping, bounds)| *jumping && bounds.partial)
+    }
+
+    /// True if a term has another value after a piece of a path than before, which matters.
+    fn jumps(&mut self, all: &Examination, path: &Path, (lo, hi): (f64, f64)) -> bool {
+        let program = &all.terms.terms;
+        let [mut before, mut after] = [lo, hi].map(|at| (at, Vec::new()));
+        for (at, out) in [&mut before, &mut after] {
+            path.everything_at(*at, &mut self.values);
+            out.resize(program.outputs(), 0.0);
+            program.eval(&self.values, &mut self.scratch, out);
+        }
+        let differences = before.1.iter().zip(&after.1).map(|(before, after)| (after - before).abs());
+        let tolerance = JUMP * all.step.conditions.tolerance;
+        let mut jumps = all.terms.jumping.iter().zip(differences);
+        jumps.any(|(jumping, difference)| *jumping && exceeds(all.scale * difference, tolerance))
+    }
+
     /// True if the bounds of some term over a piece of a path allow for a pulse that no stage has seen.
     fn is_surprised(&mut self, all: &Examination, path: &Path, part: f64, (lo, hi): (f64, f64)) -> bool {
         let (share, tolerance) = (part * (hi - lo), all.step.conditions.tolerance);
         (0..self.bounds_out.len()).any(|term| {
-            let bounds = self.bounds_out[term];
+            let (bounds, is_stiff) = (self.bounds_out[term], self.stiff[term]);
             let is_outer = term < all.terms.outer && all.reader.is_none();
-            if is_outer
-                && (bounds.hi - bounds.lo).max(0.0) * all.scale * share <= tolerance
-                && !all.step.conditions.stiff
-            {
+            if is_outer && (bounds.hi - bounds.lo).max(0.0) * all.scale * share <= tolerance && !is_stiff {
                 return false;
             }
             if !is_outer && !bounds.magnitude().is_finite() {
@@ -301,8 +350,8 @@ impl PulseDetector {
             for sampled in [Sampled::Ends, Sampled::Stages] {
                 self.sample(all, sampled);
                 let range = self.ranges[term];
-                let usual = if all.step.conditions.stiff { range.magnitude() } else { range.hi - range.lo };
-                excess = match all.step.conditions.stiff {
+                let usual = if is_stiff { range.magnitude() } else { range.hi - range.lo };
+                excess = match is_stiff {
                     true => (bounds.hi.max(0.0), (-bounds.lo).max(0.0)),
                     false => (bounds.hi - range.hi, range.lo - bounds.lo),
                 };

@@ -140,7 +140,9 @@ impl Search<'_, '_> {
                         let near = atom < 64 && state.next.near() & 1 << atom != 0;
                         let decides = self.decides(atom);
                         let ahead = self.look_ahead(atom, tolerance, 0.0, near, decides);
-                        self.tracked.push(TrackedAtom { atom, tolerance, ahead });
+                        if !self.is_limit(atom, &ahead) {
+                            self.tracked.push(TrackedAtom { atom, tolerance, ahead });
+                        }
                     }
                 }
             }
@@ -161,6 +163,14 @@ impl Search<'_, '_> {
     /// True if a production may depend on an atom that is integrated, so that doubts about it have to be reported.
     fn decides(&self, atom: usize) -> bool {
         self.is_integrated() && produces(self.path.rule, &self.now, atom)
+    }
+
+    /// True if what lies ahead of an atom is a limit, at which nothing ever arrives.
+    fn is_limit(&mut self, atom: usize, ahead: &Lookahead) -> bool {
+        let comes = matches!(self.now[atom], Sign::Plus | Sign::Minus);
+        let place =
+            ahead.next.map(|crossing| crossing.position).or(ahead.doubt).or(ahead.near.then_some(self.limit));
+        comes && place.is_some_and(|place| self.detector.is_limit(self.path, atom, place))
     }
 
     /// The first crossing or doubt of an atom from a position on.
@@ -319,7 +329,8 @@ impl Search<'_, '_> {
                 Lookahead::default()
             } else {
                 let decides = self.decides(atom);
-                self.look_ahead(atom, tolerance, from, false, decides)
+                let ahead = self.look_ahead(atom, tolerance, from, false, decides);
+                if self.is_limit(atom, &ahead) { Lookahead::default() } else { ahead }
             };
         }
     }
