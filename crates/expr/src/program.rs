@@ -285,6 +285,11 @@ impl Program {
         Program { constants, curves, arrays, fields, code, outputs, variables, registers, reads }
     }
 
+    /// The number of variables that the roots may read.
+    pub fn variables(&self) -> usize {
+        self.variables
+    }
+
     /// Number of values that an evaluation gives.
     pub fn outputs(&self) -> usize {
         self.outputs.len()

@@ -16,6 +16,10 @@ pub trait Rates {
     /// Writes the partial derivatives at `(tau, y)` to `out`: one for each of [`couplings`](Rates::couplings), in the same order.
     fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>);
 
+    /// Adds to `out` the error of each rate by the rounding of its terms, where these are known: `tanh(50*t) - 1` may be much less than both. Nothing
+    /// by default.
+    fn add_rounding(&mut self, _tau: f64, _y: &[f64], _out: &mut [f64]) {}
+
     /// The number that one evaluation of the rates adds to [`Stepper::evaluations`](crate::Stepper::evaluations): how many modules
     /// share the system.
     fn modules(&self) -> u64;

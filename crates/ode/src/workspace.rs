@@ -181,7 +181,7 @@ impl Workspace {
         if size.is_finite() && size > 0.0 { size } else { 1e-6 }
     }
 
-    /// Estimates the error of each rate by rounding of the state, from the partial derivatives.
+    /// Estimates the error of each rate by rounding of the state, from the partial derivatives, and of its terms.
     pub(crate) fn measure_noise(&mut self, system: &mut impl Rates, y: &[f64]) {
         let (couplings, mut partials) = (system.couplings(), Vec::new());
         system.partials(0.0, y, &mut partials);
@@ -191,6 +191,7 @@ impl Workspace {
             let part = f64::EPSILON * (slope * y[column as usize]).abs();
             self.noise[row as usize] += if part.is_finite() { part } else { 0.0 };
         }
+        system.add_rounding(0.0, y, &mut self.noise);
     }
 
     /// True for a step so short that no more than a small part of the tolerance can change in it, however rates may jump. Shorter

@@ -136,6 +136,9 @@ impl Independent<'_> {
     }
 }
 
+/// A term is made larger by so many times its rounding, to see what that does to rates: so much that it shows.
+const MANY_ROUNDINGS: f64 = 64.0;
+
 /// Most times that a step is cut because it may have overlooked a pulse.
 const MAX_TRIES: usize = 100;
 
@@ -156,6 +159,34 @@ impl Rates for Independent<'_> {
         values.eval(&self.variables, &mut self.scratch, &mut all);
         out.clear();
         out.extend(self.entries().map(|(.., entry)| all[entry]));
+    }
+
+    fn add_rounding(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+        self.move_to(tau, y);
+        let all = &self.solve.pulses.rates;
+        let mut terms = vec![0.0; all.terms.outputs()];
+        if terms.is_empty() {
+            return;
+        }
+        all.terms.eval(&self.variables, &mut self.scratch, &mut terms);
+        let first = all.disturbed.variables() - terms.len();
+        let mut variables = self.variables[..first].to_vec();
+        variables.resize(first + terms.len(), 0.0);
+        let [mut rates, mut others] = [(); 2].map(|()| vec![0.0; all.disturbed.outputs()]);
+        all.disturbed.eval(&variables, &mut self.scratch, &mut rates);
+        for (more, term) in (first..).zip(&terms) {
+            variables[more] = MANY_ROUNDINGS * f64::EPSILON * term.abs();
+            all.disturbed.eval(&variables, &mut self.scratch, &mut others);
+            variables[more] = 0.0;
+            for ((rate, other), of) in rates.iter().zip(&others).zip(&all.parameters) {
+                let rounding = (other - rate).abs() / MANY_ROUNDINGS;
+                if let Some(component) = self.numeric.iter().position(|variable| variable == of)
+                    && rounding.is_finite()
+                {
+                    out[component] += rounding;
+                }
+            }
+        }
     }
 
     fn modules(&self) -> u64 {
