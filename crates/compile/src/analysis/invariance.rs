@@ -113,8 +113,11 @@ impl Surface<'_> {
         let linear = gap[0].solved_for(number).filter(|(slope, _)| !slope.may_be_zero());
         let places = match linear.and_then(|(slope, rest)| rest.over(slope)?.scaled(Bounded::exactly(-1.0))) {
             Some(place) => vec![place],
-            // A surface of several sheets is as good as the worst of them.
-            None => self.roots(point, still)?.into_iter().map(Form::number).collect(),
+            // A surface of several sheets is as good as the worst of them. One whose sheets cannot be listed has as many at other values.
+            None => match self.roots(point, still) {
+                Some(places) => places.into_iter().map(Form::number).collect(),
+                None => return Some(false),
+            },
         };
         let mut vanishes = None;
         for place in places {
