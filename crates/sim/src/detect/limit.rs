@@ -31,15 +31,7 @@ impl CrossingDetector {
         let first = self.values[pivot];
         path.everything_at(position, &mut self.values);
         let come = (self.values[pivot] - first).abs();
-        let Some(mut place) = self.meeting_place(path, atom, pivot, come) else { return false };
-        let mut at: Vec<Dual<f64>> = self.values.iter().map(|&value| Dual { value, rate: 0.0 }).collect();
-        let mut rates = vec![Dual { value: 0.0, rate: 0.0 }; solve.rates.outputs()];
-        at[pivot] = Dual { value: place, rate: 1.0 };
-        solve.rates.eval(&at, &mut Default::default(), &mut rates);
-        let rest = place - rates[output].value / rates[output].rate;
-        if rest.is_finite() && self.is_flat(path, atom, pivot, [place, rest]) {
-            place = rest;
-        }
+        let Some(place) = self.meeting_place(path, atom, pivot, come) else { return false };
         let own = path.world.tree.parameters(path.state.id).len();
         let variables = path.rule.variables;
         let around = |(v, &x): (usize, &f64)| {
@@ -64,18 +56,6 @@ impl CrossingDetector {
         // Where the bend is infinite solutions are not unique: x' = -sqrt(x) reaches 0.
         let is_smooth = !value.partial && !bend.partial && bend.magnitude().is_finite();
         is_smooth && value.magnitude() <= 2.0 * ROUNDING * place.abs() * bend.magnitude()
-    }
-
-    /// True if rounding makes the sides of an atom equal all the way from one value of a variable to another: `exp(x) - 1` below 1e-16.
-    fn is_flat(&mut self, path: &Path, atom: usize, pivot: usize, [from, to]: [f64; 2]) -> bool {
-        let mut variables = self.values[..path.rule.variables].to_vec();
-        let (sides, mut scratch) = (&path.rule.sides, Vec::new());
-        let mut out = vec![0.0; sides.outputs()];
-        (0..=4).all(|quarters| {
-            variables[pivot] = from + 0.25 * f64::from(quarters) * (to - from);
-            sides.eval(&variables, &mut scratch, &mut out);
-            out[2 * atom] == out[2 * atom + 1]
-        })
     }
 
     /// The value of a variable at which the sides of an atom meet, near the present one or no further away than that has `come` on this path.
