@@ -208,3 +208,19 @@ proptest! {
         prop_assert!((found - expected).abs() < 2e-5 * expected.abs().max(1.0), "{:?}: {}, not {}\n{}", method, found, expected, text);
     }
 }
+
+/// The instant of one of its jumps, by the numbers of a step, is a rounding before it by those of the next.
+#[test]
+fn a_jump_is_behind_by_the_numbers_of_the_next_step_too() {
+    let text = "initial string: B(2.651428815840137) A(0, 0, 0)
+B(y): solve dy/dt = 1.2471818362544163*sqrt(1 + y^2)
+B(y) < A(x, s, n):
+  solve dx/dt = if floor(y) - 3*floor(y/3) = 1 then 2 else 1
+  if s = 0 & floor(y) - 3*floor(y/3) = 1 produce A(x, 1, n + 1)
+  if s = 1 & !(floor(y) - 3*floor(y/3) = 1) produce A(x, 0, n + 1)";
+    for method in [Method::Auto, Method::Dopri5, Method::Radau] {
+        let strings = run(text, Settings { method, ..Settings::default() }, &[3.0]);
+        let string = strings.unwrap_or_else(|error| panic!("{method:?}: {error}")).remove(0);
+        assert_eq!(string[1].1[2], 75.0, "{method:?}");
+    }
+}

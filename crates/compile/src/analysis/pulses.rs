@@ -6,7 +6,7 @@
 //! beginning, where a step begins as well; a rate that is linear in it has no pulse.
 //!
 //! What is found are the terms of sums, not whole rates: in stiff equations large terms cancel each other, and bounds of their sum over a range of states tell
-//! nothing. Those of one term do.
+//! nothing. Those of one term do, and those of the sum of all that may have pulses in a rate, because two steps that come and go are short together only.
 
 use dlsys_expr::{Binary, Graph, Node, NodeId, Program, Unary};
 use dlsys_model::{Kinds, Pattern, PulseTerms, Pulses, SolutionForm};

@@ -8,6 +8,7 @@
 use super::crossing::CrossingDetector;
 use crate::world::path::Path;
 use dlsys_expr::{Dual, Interval};
+use dlsys_model::ZeroCrossing;
 
 /// Steps of Newton's method from the number that has come near to the place itself.
 const STEPS: usize = 8;
@@ -22,10 +23,14 @@ impl CrossingDetector {
     /// True if the sides of an atom, which seem to meet at a position, or to have come near each other there, do so at a limit of the only
     /// parameter that moves in them.
     pub(super) fn is_limit(&mut self, path: &Path, atom: usize, position: f64) -> bool {
+        // Sides that meet at one value only have been judged for all values (`dlsys_compile`).
+        let crossing = &path.rule.zero_crossings(path.state.solve.get())[atom];
+        if !matches!(crossing, ZeroCrossing::Search { sum: None, level: None }) {
+            return false;
+        }
         let mut moving = path.rule.atom_reads[atom].iter().copied().filter(|v| path.moves(*v));
         let (Some(pivot), None) = (moving.next(), moving.next()) else { return false };
         let Some(solve) = path.state.solve.get().map(|solve| &path.rule.solves[solve]) else { return false };
-        // Its rate may be that of another clause elsewhere, but not near a limit of this one.
         let Some(output) = solve.of.iter().position(|parameter| *parameter == pivot) else { return false };
         path.at(0.0, &mut self.values);
         let first = self.values[pivot];

@@ -17,9 +17,12 @@
 //! with its own change: where its bounds go beyond the range of its values at the stages by far more than that range, they show what no stage has seen.
 //! What that does to a rate is measured: the rate is evaluated with the term as it may be.
 //!
+//! What jumps in an aggregate is not frozen, as what jumps elsewhere in rates is. So a term that reads one is followed to the first place at which it has another
+//! value before and after; the step ends there, and the next one, which is tiny, passes over it.
+//!
 //! The value of a neighbour that follows a formula hides its terms, so those are examined along with the equations that read it.
 //!
-//! In stiff equations terms are compared with their sizes at the stages: the rates of two states a tolerance apart may
+//! In stiff equations terms that read what is integrated are compared with their sizes at the stages: the rates of two states a tolerance apart may
 //! differ by any amount. A term may still be a steep
 //! function of a difference of two values that move together, so it is bounded by its value in the middle of a piece and its derivative along the dense
 //! output, too, in which the two rates cancel: the excess of that bound falls with the square of the piece.

@@ -8,6 +8,7 @@
 
 use super::EventStage;
 use super::levels::put_levels;
+use crate::world::path::Path;
 use crate::world::state::{Change, Signs};
 use dlsys_expr::Dual;
 use dlsys_model::{Comparison, Model, Rule, Sign, Truth};
@@ -15,6 +16,9 @@ use dlsys_tree::{ModuleId, SimTime};
 
 /// No event is put off by more than this part of the present time, or of 1: then what jumps moves less than its rounding.
 const LONGEST_DELAY: f64 = 1e-6;
+
+/// What is integrated goes on from numbers that differ by a rounding from those of the instant, so it has to be past the jump by this part of its size.
+const CLEARANCE: f64 = 8.0 * f64::EPSILON;
 
 /// And none by less: near t = 0 the resolution of time is so fine that what has moved is less than the smallest normal number.
 const SHORTEST_DELAY: f64 = 1e-18;
@@ -103,21 +107,26 @@ impl<'m> EventStage<'_, 'm> {
         // Of numbers below the normal ones parts are lost.
         let is_normal = at.to_f64() == 0.0 || at.to_f64().abs() >= SHORTEST_DELAY;
         let now = self.signs_by_numbers(id, rule, touched);
-        if is_normal && question.holds(&now) {
+        let is_integrated = self.is_integrated(id, rule, touched, &question.jumps);
+        let is_past = |stage: &mut Self, delay: f64| {
+            question.holds(&stage.signs_later(id, rule, touched, delay, 0.0))
+                && (!is_integrated || question.holds(&stage.signs_later(id, rule, touched, delay, CLEARANCE)))
+        };
+        self.flows.known_rates.clear();
+        if is_normal && question.holds(&now) && (!is_integrated || is_past(self, 0.0)) {
             return self.at_the_numbers(touched, &question.jumps, &now);
         }
         let longest = LONGEST_DELAY * at.to_f64().abs().max(1.0);
         let waited = touched.iter().map(|change| at.since(change.time)).fold(0.0, f64::max);
         let mut delay = at.resolution().max(SHORTEST_DELAY).max(waited);
-        self.flows.known_rates.clear();
         while delay <= longest {
-            if question.holds(&self.signs_later(id, rule, touched, delay)) {
+            if is_past(self, delay) {
                 return When::Later(at.after(delay));
             }
             delay *= 2.0;
         }
         // It only touches: nothing follows from signs that it does not get.
-        let later = self.signs_later(id, rule, touched, longest);
+        let later = self.signs_later(id, rule, touched, longest, 0.0);
         for (place, change) in touched.iter_mut().enumerate().filter(|(place, _)| question.jumps[*place]) {
             (change.at, change.after) = (now[place], later[place]);
         }
@@ -177,11 +186,28 @@ impl<'m> EventStage<'_, 'm> {
         signs(rule, touched, &self.scratch.variables, &mut self.scratch.registers)
     }
 
-    /// The signs of differences a little later.
-    fn signs_later(&mut self, id: ModuleId, index: usize, touched: &[Change], delay: f64) -> Vec<Sign> {
+    /// True if something is integrated of which the differences are made that jump.
+    fn is_integrated(&self, id: ModuleId, rule: usize, touched: &[Change], jumps: &[bool]) -> bool {
+        let (of_rule, state) = (&self.setup.model.rules[rule], self.world.state(id).expect("scheduled"));
+        let path = Path::new(self.world, state, of_rule, self.instant.at, 0.0);
+        let mut jumping = touched.iter().zip(jumps).filter(|(_, jumps)| **jumps);
+        jumping.any(|(change, _)| path.is_integrated(&of_rule.atom_reads[change.atom()]))
+    }
+
+    /// The signs of differences a little later, where all that moves has not come as far by this part of its size.
+    fn signs_later(
+        &mut self,
+        id: ModuleId,
+        index: usize,
+        touched: &[Change],
+        delay: f64,
+        clearance: f64,
+    ) -> Vec<Sign> {
         let mut moving: Vec<Dual<f64>> = Vec::new();
         self.flow().moving_variables(id, delay, &mut moving);
-        let values: Vec<f64> = moving.iter().map(|variable| variable.value).collect();
+        let back =
+            |v: &Dual<f64>| if v.rate == 0.0 { 0.0 } else { clearance * v.value.abs() * v.rate.signum() };
+        let values: Vec<f64> = moving.iter().map(|variable| variable.value - back(variable)).collect();
         signs(&self.setup.model.rules[index], touched, &values, &mut self.scratch.registers)
     }
 }
