@@ -34,6 +34,12 @@ fn only_one_of_many_zeros_is_a_limit() {
             50.0,
         );
         assert_eq!(string[0].0, "A", "{method:?}");
+        // A step begins beyond the limit at 0, by 1e-30, where the one before has overshot it.
+        let string = of(
+            "initial string: A(0.745)\nA(x):\n  solve dx/dt = -0.3*sinh(x)\n  if x*(x - 1) >= 0 produce C(x)",
+            235.0,
+        );
+        assert_eq!(string[0].0, "A", "{method:?}");
     }
 }
 

@@ -176,6 +176,8 @@ impl Value for Interval {
                 image.flagged(image.lo != image.hi)
             }
             Unary::Cos => a.cos(),
+            // A sine of 0 is 0, not the rounding of a phase.
+            Unary::Sin if a.magnitude() <= FRAC_PI_2 => a.increasing(f64::sin),
             Unary::Sin => Interval { lo: a.lo - FRAC_PI_2, hi: a.hi - FRAC_PI_2, ..a }.cos(),
             // Within one period the product with π keeps the digits.
             Unary::SinPi | Unary::CosPi => {

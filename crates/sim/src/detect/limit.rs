@@ -12,7 +12,7 @@ use dlsys_model::ZeroCrossing;
 
 /// Steps of Newton's method from the number that has come near to the place itself.
 const STEPS: usize = 8;
-/// It is no further away than this part of its size,
+/// It is no further away than this part of its size, or than values are known,
 const NEAR: f64 = 1e-3;
 /// and is known up to this part of it.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
@@ -63,7 +63,8 @@ impl CrossingDetector {
         is_smooth && value.magnitude() <= 2.0 * ROUNDING * place.abs() * bend.magnitude()
     }
 
-    /// The value of a variable at which the sides of an atom meet, near the present one or no further away than that has `come` on this path.
+    /// The value of a variable at which the sides of an atom meet, near the present one or no further away than that has `come` on this path, or
+    /// than the error of integration: a step may begin where the one before has overshot a limit at 0.
     /// `self.values` has those of all variables.
     fn meeting_place(&mut self, path: &Path, atom: usize, pivot: usize, come: f64) -> Option<f64> {
         let start = self.values[pivot];
@@ -85,6 +86,8 @@ impl CrossingDetector {
                 break;
             }
         }
-        ((place - start).abs() <= come.max(NEAR * start.abs().max(place.abs()))).then_some(place)
+        let size = start.abs().max(place.abs());
+        let near = come.max(NEAR * size).max(path.error() * size.max(1.0));
+        ((place - start).abs() <= near).then_some(place)
     }
 }
