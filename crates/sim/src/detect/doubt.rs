@@ -54,7 +54,7 @@ impl Lookahead {
         Lookahead { next, ..Lookahead::default() }
     }
 
-    fn in_doubt(position: f64) -> Lookahead {
+    pub(super) fn in_doubt(position: f64) -> Lookahead {
         Lookahead { doubt: Some(position), ..Lookahead::default() }
     }
 

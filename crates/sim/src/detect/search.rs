@@ -16,6 +16,7 @@ use smallvec::SmallVec;
 
 use crate::detect::crossing::{Crossing, CrossingDetector, LocationMethod, location_method, reachable};
 use crate::detect::doubt::{AtomQuery, Lookahead};
+use crate::detect::limit::Arrival;
 use crate::detect::signs::{matters, produces};
 use crate::world::path::Path;
 use crate::world::state::{Change, Signs};
@@ -140,9 +141,8 @@ impl Search<'_, '_> {
                         let near = atom < 64 && state.next.near() & 1 << atom != 0;
                         let decides = self.decides(atom);
                         let ahead = self.look_ahead(atom, tolerance, 0.0, near, decides);
-                        if !self.is_limit(atom, &ahead) {
-                            self.tracked.push(TrackedAtom { atom, tolerance, ahead });
-                        }
+                        let ahead = self.but_for_limits(atom, ahead);
+                        self.tracked.push(TrackedAtom { atom, tolerance, ahead });
                     }
                 }
             }
@@ -165,12 +165,19 @@ impl Search<'_, '_> {
         self.is_integrated() && produces(self.path.rule, &self.now, atom)
     }
 
-    /// True if what lies ahead of an atom is a limit, at which nothing ever arrives.
-    fn is_limit(&mut self, atom: usize, ahead: &Lookahead) -> bool {
-        let comes = matches!(self.now[atom], Sign::Plus | Sign::Minus);
-        let place =
-            ahead.next.map(|crossing| crossing.position).or(ahead.doubt).or(ahead.near.then_some(self.limit));
-        comes && place.is_some_and(|place| self.detector.is_limit(self.path, atom, place))
+    /// What lies ahead of an atom, but for limits, at which nothing ever arrives.
+    fn but_for_limits(&mut self, atom: usize, ahead: Lookahead) -> Lookahead {
+        let sign = self.now[atom];
+        let place = ahead.next.map(|crossing| crossing.position).or(ahead.doubt);
+        let Some(position) = place.or(ahead.near.then_some(self.limit)) else { return ahead };
+        if !matches!(sign, Sign::Plus | Sign::Minus) {
+            return ahead;
+        }
+        match self.detector.arrival(self.path, atom, position, sign) {
+            Arrival::Never => Lookahead::default(),
+            Arrival::Unclear if ahead.next.is_none() => Lookahead::in_doubt(position),
+            _ => ahead,
+        }
     }
 
     /// The first crossing or doubt of an atom from a position on.
@@ -330,7 +337,7 @@ impl Search<'_, '_> {
             } else {
                 let decides = self.decides(atom);
                 let ahead = self.look_ahead(atom, tolerance, from, false, decides);
-                if self.is_limit(atom, &ahead) { Lookahead::default() } else { ahead }
+                self.but_for_limits(atom, ahead)
             };
         }
     }
