@@ -223,20 +223,21 @@ impl<'s> Casters<'s> {
         let mut count = 0;
         for place in &group.places {
             let place = place.as_ref();
-            let vertices = &draft.mesh.vertices;
             let terrain = group.scene.terrain.filter(|_| place.is_none());
-            for face in self.casting(&draft.mesh.faces, place) {
-                let around = if Some(face.owner) == terrain { &mut soil } else { &mut around };
-                for (v, _) in face.corners {
-                    let at = vertices[v as usize];
-                    around.include(&place.map_or(at, |place| place.point(at)).coords);
+            draft.each_piece(&mut |piece| {
+                for face in self.casting(&piece.mesh.faces, place) {
+                    let around = if Some(face.owner) == terrain { &mut soil } else { &mut around };
+                    for (v, _) in face.corners {
+                        let at = piece.mesh.vertices[v as usize];
+                        around.include(&place.map_or(at, |place| place.point(at)).coords);
+                    }
+                    count += 1;
                 }
-                count += 1;
-            }
-            for (ends, _) in draft.lines(place) {
-                ends.iter().for_each(|end| around.include(&end.coords));
-                count += 1;
-            }
+                for (ends, _) in piece.lines(place) {
+                    ends.iter().for_each(|end| around.include(&end.coords));
+                    count += 1;
+                }
+            });
         }
         Measured { draft, soil, around, count }
     }
@@ -259,33 +260,38 @@ impl<'s> Casters<'s> {
             let Some(draft) = kept.as_ref().or(made.as_ref()) else { continue };
             for place in &group.places {
                 let place = place.as_ref();
-                let mut rest = &draft.mesh.faces[..];
-                while !rest.is_empty() {
-                    let (faces, later) = rest.split_at(batch.room().min(rest.len()));
-                    rest = later;
-                    // Triangles that follow one another have vertices that do.
-                    let corners = self.casting(faces, place).flat_map(|face| face.corners.map(|(v, _)| v));
-                    let (low, end) =
-                        corners.fold((u32::MAX, 0), |(low, end), v| (low.min(v), end.max(v + 1)));
-                    let first = batch.vertices[0].len() as u32;
-                    let vertices = draft.mesh.vertices.get(low as usize..end as usize).unwrap_or_default();
-                    let placed = vertices.iter().map(|&p| relative(place.map_or(p, |place| place.point(p))));
-                    for p in placed {
-                        batch.vertices.iter_mut().zip(p).for_each(|(all, x)| all.push(x));
-                    }
-                    for face in self.casting(faces, place) {
-                        let corners = face.corners.map(|(v, _)| first + (v - low));
-                        match draft.cut_out(face) {
-                            None => batch.triangles.push(corners),
-                            Some((places, texture)) => batch.cut.push((corners, places, texture)),
+                draft.each_piece(&mut |draft| {
+                    let mut rest = &draft.mesh.faces[..];
+                    while !rest.is_empty() {
+                        let (faces, later) = rest.split_at(batch.room().min(rest.len()));
+                        rest = later;
+                        // Triangles that follow one another have vertices that do.
+                        let corners =
+                            self.casting(faces, place).flat_map(|face| face.corners.map(|(v, _)| v));
+                        let (low, end) =
+                            corners.fold((u32::MAX, 0), |(low, end), v| (low.min(v), end.max(v + 1)));
+                        let first = batch.vertices[0].len() as u32;
+                        let vertices =
+                            draft.mesh.vertices.get(low as usize..end as usize).unwrap_or_default();
+                        let placed =
+                            vertices.iter().map(|&p| relative(place.map_or(p, |place| place.point(p))));
+                        for p in placed {
+                            batch.vertices.iter_mut().zip(p).for_each(|(all, x)| all.push(x));
                         }
+                        for face in self.casting(faces, place) {
+                            let corners = face.corners.map(|(v, _)| first + (v - low));
+                            match draft.cut_out(face) {
+                                None => batch.triangles.push(corners),
+                                Some((places, texture)) => batch.cut.push((corners, places, texture)),
+                            }
+                        }
+                        pass_on(&mut batch);
                     }
-                    pass_on(&mut batch);
-                }
-                for (ends, radii) in draft.lines(place) {
-                    batch.lines.push((ends.map(relative), radii.map(|r| r as f32)));
-                    pass_on(&mut batch);
-                }
+                    for (ends, radii) in draft.lines(place) {
+                        batch.lines.push((ends.map(relative), radii.map(|r| r as f32)));
+                        pass_on(&mut batch);
+                    }
+                });
             }
         }
         visit(&batch);

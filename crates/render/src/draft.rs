@@ -26,6 +26,11 @@ const CAP: f64 = std::f64::consts::FRAC_PI_4;
 /// Least cosine of a bend at which two ribbons meet in a common edge, and most that this edge is longer than they are wide.
 const SHARPEST: f64 = 0.2;
 const LONGEST: f64 = 1.5;
+/// A mesh of more vertices is made piece by piece, each of about so many.
+const LARGE: usize = 1 << 21;
+const PIECE: usize = 1 << 16;
+/// Sides of tubes of which there are more than numbers of their vertices.
+const FEWEST_SIDES: usize = 3;
 /// Most stems that tubes are made for in a drawing without depth.
 const MOST_FLAT: usize = 100_000;
 
@@ -54,6 +59,26 @@ pub(super) struct Draft<'s> {
     thin: Vec<u32>,
     /// By segment: the one that continues it, if both are thin.
     next: Vec<u32>,
+    /// In place of a mesh that is very large.
+    unmade: Option<Unmade<'s>>,
+}
+
+/// A mesh so large that it is made and dropped piece by piece.
+struct Unmade<'s> {
+    solid: Solid<'s>,
+    /// Its items in the order of the mesh, and which of them are a piece.
+    items: Vec<u32>,
+    pieces: Vec<Range<usize>>,
+    /// The normal of a plane that it is [pressed](Draft::flatten) into.
+    plane: Option<Vector>,
+}
+
+impl<'s> Unmade<'s> {
+    fn new(solid: Solid<'s>) -> Unmade<'s> {
+        let items = solid.by_owner();
+        let pieces = solid.parts(items.iter().map(|n| *n as usize), PIECE);
+        Unmade { solid, items, pieces, plane: None }
+    }
 }
 
 const NONE: u32 = u32::MAX;
@@ -102,9 +127,17 @@ impl<'s> Draft<'s> {
             floor: detail.floor,
             steady: false,
         };
-        let tubes = Tubes::of(scene, style, sides, |i| !is_thin[i]);
+        let mut tubes = Tubes::of(scene, style, sides, |i| !is_thin[i]);
+        if tubes.counts.contains(&u32::MAX) {
+            // There are not so many numbers.
+            tubes = Tubes::of(scene, style, |_, _| FEWEST_SIDES, |i| !is_thin[i]);
+        }
         let solid = Solid::of(scene, tubes, scene.drafted(wanted));
-        let mesh = Triangles::of(&solid, |_| true);
+        let (mesh, unmade) = if solid.counts[0] as usize <= LARGE {
+            (Triangles::of(&solid, |_| true), None)
+        } else {
+            (Triangles::with_capacity(0, 0, 0), Some(Unmade::new(solid)))
+        };
         let thin: Vec<u32> = (0..scene.segments.len() as u32).filter(|i| is_thin[*i as usize]).collect();
         let mut next = vec![NONE; if thin.is_empty() { 0 } else { scene.segments.len() }];
         for &i in &thin {
@@ -113,7 +146,7 @@ impl<'s> Draft<'s> {
                 next[before] = i;
             }
         }
-        Draft { scene, default_width, mesh, thin, next }
+        Draft { scene, default_width, mesh, thin, next, unmade }
     }
 
     /// Presses the stems of a drawing in a plane into that plane, which has this unit normal: in perspective, ends of tubes would be ellipses, and
@@ -122,10 +155,33 @@ impl<'s> Draft<'s> {
         /// The part of the depth that is left.
         const LEFT: f64 = 1e-3;
         let Some(first) = self.scene.segments.first() else { return };
+        if let Some(unmade) = &mut self.unmade {
+            unmade.plane = Some(normal);
+        }
         let depth = normal.dot(&first.start.coords);
         for vertex in &mut self.mesh.vertices {
             *vertex -= normal * ((normal.dot(&vertex.coords) - depth) * (1.0 - LEFT));
         }
+    }
+
+    /// Passes on the draft, or, if its mesh is very large, drafts of a piece of that each, and then one of its thin stems.
+    pub(super) fn each_piece(&self, work: &mut dyn FnMut(&Draft<'s>)) {
+        if let Some(unmade) = &self.unmade {
+            for piece in &unmade.pieces {
+                let mut draft = Draft {
+                    mesh: Triangles::of_items(&unmade.solid, &unmade.items[piece.clone()]),
+                    thin: Vec::new(),
+                    next: Vec::new(),
+                    unmade: None,
+                    ..*self
+                };
+                if let Some(normal) = unmade.plane {
+                    draft.flatten(normal);
+                }
+                work(&draft);
+            }
+        }
+        work(self);
     }
 
     /// Of a triangle of which parts are cut out: where its corners lie in the picture, and that.
@@ -142,9 +198,10 @@ impl<'s> Draft<'s> {
         self.scene.palette.texture(face.material).filter(|texture| texture.picture.is_cut_out())
     }
 
-    /// How many triangles there are.
+    /// About how many triangles there are.
     pub(super) fn len(&self) -> usize {
-        self.mesh.faces.len() + 2 * self.thin.len()
+        let unmade = self.unmade.as_ref().map_or(0, |unmade| 2 * unmade.solid.counts[0] as usize);
+        self.mesh.faces.len() + unmade + 2 * self.thin.len()
     }
 
     /// The thin stems: ends and radii, each placed.

@@ -143,9 +143,12 @@ impl<'s> Field<'s> {
         for block in self.nearest_first(&stage).chunks(BLOCK) {
             let make = |number: usize| {
                 let part = block[number];
-                stage.with_draft(part, |draft| front.seen(draft, part, self.small_owner(part)))
+                let mut all = Vec::new();
+                stage
+                    .with_draft(part, &mut |draft| all.push(front.seen(draft, part, self.small_owner(part))));
+                all
             };
-            for (kept, hiding) in each(threads, block.len(), make) {
+            for (kept, hiding) in each(threads, block.len(), make).into_iter().flatten() {
                 front.hide_behind(&hiding);
                 mesh.append(&kept);
             }
@@ -438,13 +441,14 @@ mod tests {
         let mut count = 0;
         for part in &stage.parts {
             let nothing = Front::new(field.cells());
-            let (mesh, hiding) =
-                stage.with_draft(part, |draft| nothing.seen(draft, part, Some(OwnerId::default())));
-            count += mesh.faces.len();
-            all.hide_behind(&hiding);
-            if part.plant.is_none() {
-                seen.hide_behind(&hiding);
-            }
+            stage.with_draft(part, &mut |draft| {
+                let (mesh, hiding) = nothing.seen(draft, part, Some(OwnerId::default()));
+                count += mesh.faces.len();
+                all.hide_behind(&hiding);
+                if part.plant.is_none() {
+                    seen.hide_behind(&hiding);
+                }
+            });
         }
         assert!(2 * kept.faces.len() < count, "{} of {count} are kept", kept.faces.len());
         let places: Vec<[Place; 3]> =

@@ -84,7 +84,7 @@ pub(super) fn draw(size: [u32; 2], lines: &[GlyphLine], color: Color) -> Image {
     let [width, height] = size.map(|side| side as usize);
     let mut pixels = vec![[0; 4]; width * height];
     let triangles = Plain { triangles: &triangles, color: [color.red, color.green, color.blue] };
-    raster::draw(&raster::SIXTEEN, 1, [width, height], 0..height, &triangles, &mut pixels);
+    raster::draw(&raster::SIXTEEN, 1, [width, height], &triangles, &mut pixels);
     Image { width, height, pixels }
 }
 

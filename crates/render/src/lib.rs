@@ -83,7 +83,6 @@ mod sheet;
 mod shot;
 mod sky;
 mod stage;
-mod strips;
 mod stroke;
 mod text;
 mod trace;

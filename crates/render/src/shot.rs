@@ -9,12 +9,12 @@ use super::lighting::Lighting;
 use super::mapping::{Cut, Mapping, Pinned};
 use super::raster::{self, Image, Pattern, Place};
 use super::stage::{Part, Stage};
-use super::strips::Census;
+use super::triangles::{keep_numbered, renumbered};
 use super::veil::Veil;
 use dlsys_geometry::scene::{Color, Point, Texture, Vector};
 use dlsys_threads::each;
 
-/// Most triangles that are in memory at a time: a picture with more is drawn in strips.
+/// From so many triangles on, those that are hidden by the ones so far are dropped.
 const MOST: usize = 6_000_000;
 /// Parts that are made side by side.
 const BLOCK: usize = 64;
@@ -35,15 +35,18 @@ struct Face {
     look: u32,
 }
 
-/// Triangles in some rows of a picture.
-struct Shot<'a> {
+/// Triangles of a picture.
+struct Shot<'a, const N: usize> {
+    pattern: &'a Pattern<N>,
+    threads: usize,
+    /// When there are more, hidden ones are dropped.
+    most: usize,
     lens: &'a Lens,
     lighting: &'a Lighting<'a>,
     veil: Option<&'a Veil<'a>>,
     colors: &'a [Color],
     /// By number of a colour: the picture in place of it.
     textures: &'a [Option<&'a Texture>],
-    rows: Range<usize>,
     places: Vec<Place>,
     /// By number of a place: where it lies in a picture; of the last ones that have no picture nothing.
     pinned: Vec<[f32; 2]>,
@@ -63,7 +66,7 @@ pub(super) fn draw<const N: usize>(
     draw_within(MOST, pattern, threads, stage, lens, lighting)
 }
 
-/// The same with at most so many triangles in memory.
+/// The same with about so many triangles in memory, and as many more as are seen.
 pub(super) fn draw_within<const N: usize>(
     most: usize,
     pattern: &Pattern<N>,
@@ -73,46 +76,36 @@ pub(super) fn draw_within<const N: usize>(
     lighting: &Lighting,
 ) -> Image {
     let [width, height] = lens.size;
-    let mut pixels = vec![[0; 4]; width * height];
     let veil = lighting.haze().map(|haze| Veil::new(haze, lens));
     let mut shot = Shot {
+        pattern,
+        threads,
+        most,
         lens,
         lighting,
         veil: veil.as_ref(),
         colors: &stage.colors,
         textures: &stage.textures,
-        rows: 0..height,
         places: Vec::new(),
         pinned: Vec::new(),
         normals: Vec::new(),
         faces: Vec::new(),
         surface: 0,
     };
-    let mut draw = |shot: &Shot| {
-        let rows = shot.rows.clone();
-        let pixels = &mut pixels[rows.start * width..rows.end * width];
-        raster::draw(pattern, threads, lens.size, rows, shot, pixels);
-    };
-    let parts: Vec<&Part> = stage.parts.iter().collect();
-    match shot.fill(most, &parts, stage, threads) {
-        None => draw(&shot),
-        Some(census) => {
-            for rows in census.strips(most) {
-                let parts: Vec<&Part> = census.parts_in(&rows).map(|number| parts[number]).collect();
-                shot.rows = rows;
-                shot.fill(usize::MAX, &parts, stage, threads);
-                draw(&shot);
-            }
-        }
+    shot.add_floor();
+    for block in stage.parts.chunks(BLOCK) {
+        shot.add_block(block, stage);
     }
+    let mut pixels = vec![[0; 4]; width * height];
+    raster::draw(pattern, threads, lens.size, &shot, &mut pixels);
     Image { width, height, pixels }
 }
 
-impl<'a> Shot<'a> {
-    /// One with nothing in it.
-    fn emptied(&self) -> Shot<'a> {
+impl<'a, const N: usize> Shot<'a, N> {
+    /// One with nothing in it, for one thread.
+    fn emptied(&self) -> Shot<'a, N> {
         Shot {
-            rows: self.rows.clone(),
+            threads: 1,
             places: Vec::new(),
             pinned: Vec::new(),
             normals: Vec::new(),
@@ -122,50 +115,60 @@ impl<'a> Shot<'a> {
         }
     }
 
-    /// All that is seen of these parts. If that is more than so many triangles, it is dropped, and all are counted instead.
-    fn fill(&mut self, most: usize, parts: &[&Part], stage: &Stage, threads: usize) -> Option<Census> {
-        self.clear();
-        self.add_floor();
-        let mut census = None;
-        // The ends of the parts so far.
-        let mut ends = vec![self.faces.len()];
-        for block in parts.chunks(BLOCK) {
-            self.add_block(block, stage, threads, &mut ends);
-            if census.is_none() && self.faces.len() <= most {
-                continue;
-            }
-            let census = census.get_or_insert_with(|| Census::new(self.lens.size[1]));
-            for part in ends.windows(2) {
-                census.add_part((part[0]..part[1]).filter_map(|n| raster::rows_of(self, n, self.rows.end)));
-            }
-            self.clear();
-            ends = vec![0];
+    /// Adds parts, in their order, made by several threads. When hidden triangles are dropped does not depend on the number of these.
+    fn add_block(&mut self, block: &[Part], stage: &Stage) {
+        if let [part] = block {
+            return self.add_part(part, stage);
         }
-        census
-    }
-
-    /// Adds parts, in their order, made by several threads, and where each ends.
-    fn add_block(&mut self, block: &[&Part], stage: &Stage, threads: usize, ends: &mut Vec<usize>) {
-        if threads <= 1 || block.len() == 1 {
-            for part in block {
-                stage.with_draft(part, |draft| self.add(draft, part));
-                ends.push(self.faces.len());
-            }
-            return;
-        }
+        let (threads, empty) = (self.threads, self.emptied());
         let make = |number: usize| {
-            let (part, mut shot) = (block[number], self.emptied());
-            stage.with_draft(part, |draft| shot.add(draft, part));
+            let mut shot = empty.emptied();
+            shot.add_part(&block[number], stage);
             shot
         };
-        for shot in each(threads, block.len(), make) {
+        let add = |shot: Shot<N>| {
             self.append(&shot);
-            ends.push(self.faces.len());
+            self.drop_hidden();
+        };
+        if threads <= 1 {
+            (0..block.len()).map(make).for_each(add);
+        } else {
+            each(threads, block.len(), make).into_iter().for_each(add);
         }
+    }
+
+    /// Adds a part.
+    fn add_part(&mut self, part: &Part, stage: &Stage) {
+        stage.with_draft(part, &mut |draft| {
+            self.add(draft, part);
+            self.drop_hidden();
+        });
+    }
+
+    /// Where there are too many triangles, drops those that are not seen, and what only these have: what comes later hides more, never less.
+    fn drop_hidden(&mut self) {
+        if self.faces.len() <= self.most {
+            return;
+        }
+        let seen = raster::seen(self.pattern, self.threads, self.lens.size, self);
+        let mut seen = seen.iter();
+        self.faces.retain(|_| seen.next().is_some_and(|seen| *seen));
+        let corners = |of: fn(&Face) -> [u32; 3]| self.faces.iter().flat_map(of);
+        let place = renumbered(self.places.len(), corners(|face| face.corners));
+        let normal = renumbered(self.normals.len(), corners(|face| face.normals));
+        keep_numbered(&mut self.places, &place);
+        keep_numbered(&mut self.pinned, &place);
+        keep_numbered(&mut self.normals, &normal);
+        for face in &mut self.faces {
+            face.corners = face.corners.map(|corner| place[corner as usize]);
+            face.normals = face.normals.map(|corner| normal[corner as usize]);
+        }
+        // Rarely enough to cost no more than the triangles themselves.
+        self.most = self.most.max(2 * self.faces.len());
     }
 
     /// Adds all that is in another one.
-    fn append(&mut self, shot: &Shot) {
+    fn append(&mut self, shot: &Shot<N>) {
         let (vertex, normal, surface) = (self.places.len() as u32, self.normals.len() as u32, self.surface);
         self.places.extend_from_slice(&shot.places);
         if !shot.pinned.is_empty() {
@@ -180,14 +183,6 @@ impl<'a> Shot<'a> {
             look: face.look,
         }));
         self.surface += shot.surface;
-    }
-
-    fn clear(&mut self) {
-        self.places.clear();
-        self.pinned.clear();
-        self.normals.clear();
-        self.faces.clear();
-        self.surface = 0;
     }
 
     /// Adds a draft in its place.
@@ -276,7 +271,7 @@ impl<'a> Shot<'a> {
     /// Adds a triangle if it may be seen.
     fn face(&mut self, corners: [u32; 3], normals: [u32; 3], look: u32) {
         let places = corners.map(|corner| self.places[corner as usize]);
-        if may_be_seen(&places, look & 1 == 1, [0..self.lens.size[0], self.rows.clone()]) {
+        if may_be_seen(&places, look & 1 == 1, self.lens.size.map(|end| 0..end)) {
             self.faces.push(Face { corners, normals, surface: self.surface, look });
         }
     }
@@ -309,7 +304,7 @@ pub(super) fn turned([p, q]: [Place; 2]) -> (f32, f32) {
 /// The look of the floor.
 const FLOOR: u32 = u32::MAX;
 
-impl Shot<'_> {
+impl<const N: usize> Shot<'_, N> {
     /// The picture on a triangle, and where its corners are.
     fn picture(&self, n: usize) -> Option<(&Texture, [Pinned; 3])> {
         let face = &self.faces[n];
@@ -339,7 +334,7 @@ impl Shot<'_> {
     }
 }
 
-impl raster::Triangles for Shot<'_> {
+impl<const N: usize> raster::Triangles for Shot<'_, N> {
     fn count(&self) -> usize {
         self.faces.len()
     }
@@ -376,7 +371,7 @@ impl raster::Triangles for Shot<'_> {
     }
 }
 
-impl Shot<'_> {
+impl<const N: usize> Shot<'_, N> {
     /// The colour of a triangle at a place that the camera projects here.
     fn surface_shade(&self, n: usize, seen: Point, weights: [f64; 3]) -> [u8; 4] {
         let face = &self.faces[n];

@@ -140,14 +140,16 @@ impl<'s> Stage<'s> {
         }
     }
 
-    /// Passes on the draft of a part. One that no other part shares is made for that, and dropped.
-    pub(super) fn with_draft<Done>(&self, part: &Part, work: impl FnOnce(&Draft) -> Done) -> Done {
+    /// Passes on the draft of a part, [piece by piece](Draft::each_piece) if that is very large. One that no other part shares is made for that, and dropped.
+    pub(super) fn with_draft(&self, part: &Part, work: &mut dyn FnMut(&Draft)) {
+        let has_mesh = part.stems.as_ref().is_none_or(Range::is_empty);
+        let mut pass_on = |draft: &Draft| if has_mesh { draft.each_piece(work) } else { work(draft) };
         let number = part.draft.checked_sub(1);
         let Some((wanted, place)) = number.and_then(|i| self.wanted.get(i).zip(self.shared.get(i))) else {
-            return work(&self.scene);
+            return pass_on(&self.scene);
         };
         let make = || wanted.draft(self.fit, self.lens);
-        if wanted.uses > 1 { work(place.get_or_init(make)) } else { work(&make()) }
+        if wanted.uses > 1 { pass_on(place.get_or_init(make)) } else { pass_on(&make()) }
     }
 }
 

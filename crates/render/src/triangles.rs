@@ -161,15 +161,32 @@ impl<'s> Solid<'s> {
         }
     }
 
+    /// Numbers of the first vertex and normal of an item.
+    fn first(&self, n: usize) -> [u32; 2] {
+        match self.item(n) {
+            Item::Stem(i) => self.tubes.first(i),
+            Item::Polygon(i) => self.polygons[i],
+            Item::Surface(i) => {
+                let [vertex, normal, _] = self.surfaces[i];
+                [vertex, normal]
+            }
+        }
+    }
+
+    /// Whether an item has corners that belong to the one before.
+    fn begins_on_one_before(&self, n: usize) -> bool {
+        matches!(self.item(n), Item::Stem(i) if self.tubes.begins_on_one_before(i))
+    }
+
     /// The module that an item belongs to.
     pub(super) fn owner_of(&self, n: usize) -> OwnerId {
         self.owner(self.item(n))
     }
 
-    /// Roughly how much there is to an item, in points.
+    /// How much there is to an item, in points.
     fn weight(&self, n: usize) -> usize {
         match self.item(n) {
-            Item::Stem(_) => 16,
+            Item::Stem(i) => self.tubes.points_of(i),
             Item::Polygon(i) => self.scene.polygons[i].vertices.len(),
             Item::Surface(i) => self.placed[i].mesh.vertices.len(),
         }
@@ -407,25 +424,12 @@ impl Triangles {
     pub(super) fn retain(&mut self, is_kept: impl Fn(&Triangle, &[Point]) -> bool) {
         let Triangles { vertices, normals, places, faces, .. } = self;
         faces.retain(|face| is_kept(face, vertices));
-        let numbers = |count: usize, of: &dyn Fn(&Triangle) -> [u32; 3]| {
-            let mut numbers = vec![u32::MAX; count];
-            faces.iter().flat_map(of).for_each(|old| numbers[old as usize] = 0);
-            let mut next = 0..;
-            numbers
-                .iter_mut()
-                .filter(|number| **number == 0)
-                .for_each(|number| *number = next.next().unwrap_or(0));
-            numbers
-        };
-        let vertex = numbers(vertices.len(), &|face| face.corners.map(|(vertex, _)| vertex));
-        let normal = numbers(normals.len(), &|face| face.corners.map(|(_, normal)| normal));
-        fn kept<T>(all: &mut Vec<T>, numbers: &[u32]) {
-            let mut numbers = numbers.iter();
-            all.retain(|_| numbers.next().is_some_and(|number| *number != u32::MAX));
-        }
-        kept(vertices, &vertex);
-        kept(places, &vertex);
-        kept(normals, &normal);
+        let corners = || faces.iter().flat_map(|face| face.corners);
+        let vertex = renumbered(vertices.len(), corners().map(|(vertex, _)| vertex));
+        let normal = renumbered(normals.len(), corners().map(|(_, normal)| normal));
+        keep_numbered(vertices, &vertex);
+        keep_numbered(places, &vertex);
+        keep_numbered(normals, &normal);
         for face in faces {
             face.corners = face.corners.map(|(v, n)| (vertex[v as usize], normal[n as usize]));
         }
@@ -453,15 +457,63 @@ impl Triangles {
             Item::Stem(piece) => kept(solid.tubes.segment_number(piece)),
             _ => true,
         });
-        solid.faces(&items, &mut mesh, |mesh, owner, material, segment| {
+        mesh.add_faces(solid, &items);
+        mesh
+    }
+
+    /// Some items of a solid, in the order of the list, with the vertices and normals that these have.
+    pub(super) fn of_items(solid: &Solid, items: &[u32]) -> Triangles {
+        let mut mesh = Triangles::with_capacity(0, 0, 0);
+        mesh.add_faces(solid, items);
+        // The items that have those, in runs, and the first numbers of each run: in the solid and here.
+        let before = |&n: &u32| solid.begins_on_one_before(n as usize).then(|| n - 1);
+        let mut all: Vec<u32> = items.iter().flat_map(|n| before(n).into_iter().chain([*n])).collect();
+        all.sort_unstable();
+        all.dedup();
+        let mut firsts: Vec<[[u32; 2]; 2]> = Vec::new();
+        for run in all.chunk_by(|a, b| a + 1 == *b) {
+            let here = [mesh.vertices.len() as u32, mesh.normals.len() as u32];
+            firsts.push([solid.first(run[0] as usize), here]);
+            solid.points(run[0] as usize..run[run.len() - 1] as usize + 1, &mut mesh);
+        }
+        if solid.has_places {
+            mesh.places.resize(mesh.vertices.len(), [0.0; 2]);
+        }
+        let here = |number: u32, kind: usize| {
+            let run = firsts.partition_point(|[of_solid, _]| of_solid[kind] <= number) - 1;
+            number - firsts[run][0][kind] + firsts[run][1][kind]
+        };
+        for face in &mut mesh.faces {
+            face.corners = face.corners.map(|(vertex, normal)| (here(vertex, 0), here(normal, 1)));
+        }
+        mesh
+    }
+
+    /// Adds the triangles of items of a solid, with the solid's numbers of vertices and normals.
+    fn add_faces(&mut self, solid: &Solid, items: &[u32]) {
+        solid.faces(items, self, |mesh, owner, material, segment| {
             // No light comes through the ground.
             let is_thin = segment.is_none() && Some(owner) != solid.scene.terrain;
             (mesh.owner, mesh.material, mesh.is_thin) = (owner, material, is_thin);
             mesh.surface += 1;
             mesh.segments.push(segment.map(|segment| segment as u32));
         });
-        mesh
     }
+}
+
+/// New numbers for those of so many things that are used, in their order; `u32::MAX` for the others.
+pub(super) fn renumbered(count: usize, used: impl Iterator<Item = u32>) -> Vec<u32> {
+    let mut numbers = vec![u32::MAX; count];
+    used.for_each(|old| numbers[old as usize] = 0);
+    let used = numbers.iter_mut().filter(|number| **number == 0);
+    (0..).zip(used).for_each(|(next, number)| *number = next);
+    numbers
+}
+
+/// Keeps those of all things that have a new number.
+pub(super) fn keep_numbered<T>(all: &mut Vec<T>, numbers: &[u32]) {
+    let mut numbers = numbers.iter();
+    all.retain(|_| numbers.next().is_some_and(|number| *number != u32::MAX));
 }
 
 #[cfg(test)]
@@ -485,5 +537,55 @@ mod tests {
         let kept: Vec<(bool, u32)> =
             mesh.faces.iter().map(|face| (face.is_thin, face.corners[1].0)).collect();
         assert_eq!(kept, [(false, 1), (true, 1), (true, 2)]);
+    }
+
+    #[test]
+    fn pieces_have_the_triangles_of_the_whole() {
+        // A stem that turns and gets thinner in steps, polygons of two colours between its segments, and branches.
+        let mut scene = Scene::default();
+        let at = |i: usize| Point::new((0.9 * i as f64).sin(), 0.4 * i as f64, (0.5 * i as f64).cos());
+        for i in 0..12 {
+            let lineage = dlsys_tree::Lineage::of_axiom(i);
+            let owner = scene.add_owner(dlsys_geometry::scene::Owner { name: "F".into(), lineage });
+            let mut add = |start: Point, end: Point, follows: Option<usize>, grows_from: Option<usize>| {
+                scene.segments.push(dlsys_geometry::scene::Segment {
+                    start,
+                    end,
+                    direction: (end - start).normalize(),
+                    across: Vector::x(),
+                    widths: [dlsys_geometry::scene::Width::Set(0.2 - 0.05 * (i / 4) as f64); 2],
+                    contour: None,
+                    material: if i % 5 == 0 { MaterialId::LEAF } else { MaterialId::STEM },
+                    owner,
+                    follows,
+                    grows_from,
+                });
+                scene.segments.len() - 1
+            };
+            let before = (i > 0).then(|| 2 * (i - 1));
+            let stem = add(at(i), at(i + 1), before, None);
+            add(at(i + 1), at(i + 1) + Vector::new(0.5, 0.2, 0.1), None, Some(stem));
+            let vertices = vec![at(i), at(i + 1), at(i + 2)];
+            scene.polygons.push(dlsys_geometry::scene::Polygon {
+                vertices,
+                material: MaterialId::LEAF,
+                owner,
+            });
+        }
+        let mut survey = crate::Survey::new(crate::View::FRONT);
+        survey.add(&scene);
+        let fit = survey.fit();
+        let solid = Solid::new(&scene, &fit, 8);
+        let corners = |mesh: &Triangles| -> Vec<_> {
+            let corner = |(v, n): (u32, u32)| (mesh.vertices[v as usize], mesh.normals[n as usize]);
+            mesh.faces.iter().map(|face| (face.corners.map(corner), face.material, face.owner)).collect()
+        };
+        let whole = corners(&Triangles::of(&solid, |_| true));
+        let items = solid.by_owner();
+        for count in [1, 2, 7, items.len()] {
+            let pieces: Vec<_> =
+                items.chunks(count).flat_map(|piece| corners(&Triangles::of_items(&solid, piece))).collect();
+            assert!(pieces == whole, "{count} at a time");
+        }
     }
 }

@@ -245,6 +245,22 @@ impl<'s> Tubes<'s> {
         self.pieces.len()
     }
 
+    /// Numbers of the first vertex and normal of a piece.
+    pub(super) fn first(&self, piece: usize) -> [u32; 2] {
+        self.pieces[piece].first
+    }
+
+    /// How many vertices a piece has of its own.
+    pub(super) fn points_of(&self, piece: usize) -> usize {
+        let end = self.pieces.get(piece + 1).map_or(self.counts, |next| next.first);
+        (end[0] - self.first(piece)[0]) as usize
+    }
+
+    /// Whether a piece has corners that belong to the one before.
+    pub(super) fn begins_on_one_before(&self, piece: usize) -> bool {
+        matches!(self.pieces[piece].begins, Begin::Joint | Begin::Shoulder)
+    }
+
     /// The segment that a piece is made of.
     pub(super) fn segment(&self, piece: usize) -> &Segment {
         &self.segments[self.segment_number(piece)]

@@ -76,6 +76,27 @@ impl<const N: usize> Band<N> {
         }
     }
 
+    /// Passes on the places in the list of all triangles that are seen, once or several times.
+    pub(super) fn each_seen(&self, mut visit: impl FnMut(u32)) {
+        let [first, end] = self.touched;
+        let mut last = NOTHING;
+        for start in (first..self.seen.len()).step_by(self.stride) {
+            for &seen in &self.seen[start..start + (end - first)] {
+                match seen {
+                    NOTHING => {}
+                    seen @ MIXED.. => {
+                        self.shared[(seen - MIXED) as usize].places().iter().for_each(|&p| visit(p))
+                    }
+                    place if place == last => {}
+                    place => {
+                        visit(place);
+                        last = place;
+                    }
+                }
+            }
+        }
+    }
+
     fn clear(&mut self) {
         let [first, end] = std::mem::take(&mut self.touched);
         for start in (first..self.seen.len()).step_by(self.stride) {

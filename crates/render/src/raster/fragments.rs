@@ -99,6 +99,11 @@ impl<const N: usize> Fragments<N> {
     pub(super) const EMPTY: Fragments<N> =
         Fragments { count: 0, places: [0; N], masks: [0; N], fars: [0.0; N] };
 
+    /// The places in the list of the triangles that share the pixel; one of them may have lost its last sample.
+    pub(super) fn places(&self) -> &[u32] {
+        &self.places[..self.count as usize]
+    }
+
     /// Begins with a triangle that has the whole pixel, given its place and depth.
     #[inline(always)]
     pub(super) fn begin(&mut self, place: u32, far: f32) {

@@ -18,7 +18,7 @@ mod plane;
 mod resolve;
 pub(super) mod samples;
 
-use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use super::mapping::Cut;
@@ -118,43 +118,63 @@ pub(super) trait Triangles: Sync {
     fn shade(&self, n: usize, pixel: [usize; 2], weights: [f64; 3]) -> [u8; 4];
 }
 
-/// The first and the last row of those above `end` that may show some of a triangle.
-pub(super) fn rows_of(triangles: &impl Triangles, number: usize, end: usize) -> Option<[usize; 2]> {
-    let [p, q, r] = triangles.corners(number);
-    range([p.y, q.y, r.y], end)
-}
-
-/// Draws triangles in some rows of a picture that is so wide and high. `pixels` are those of the rows.
+/// Draws triangles in a picture that is so wide and high, which was empty.
 pub(super) fn draw<const N: usize>(
     pattern: &Pattern<N>,
     threads: usize,
-    [width, height]: [usize; 2],
-    rows: Range<usize>,
+    size: [usize; 2],
     triangles: &impl Triangles,
     pixels: &mut [[u8; 4]],
 ) {
+    let rows = pixels.chunks_mut((BAND * size[0]).max(1));
+    in_bands(pattern, threads, size, triangles, rows, |band, list, top, pixels| {
+        band.resolve(triangles, list, top, pixels);
+    });
+}
+
+/// Whether each triangle is seen at some sample.
+pub(super) fn seen<const N: usize>(
+    pattern: &Pattern<N>,
+    threads: usize,
+    size: [usize; 2],
+    triangles: &impl Triangles,
+) -> Vec<bool> {
+    let all: Vec<AtomicBool> = (0..triangles.count()).map(|_| AtomicBool::new(false)).collect();
+    in_bands(pattern, threads, size, triangles, std::iter::repeat(()), |band, list, _, ()| {
+        band.each_seen(|place| all[list.numbers[place as usize] as usize].store(true, Ordering::Relaxed));
+    });
+    all.into_iter().map(AtomicBool::into_inner).collect()
+}
+
+/// Finds out which triangles are seen in each band, and passes that on with what belongs to the band, and its first row.
+fn in_bands<const N: usize, Own: Send>(
+    pattern: &Pattern<N>,
+    threads: usize,
+    [width, height]: [usize; 2],
+    triangles: &impl Triangles,
+    own: impl Iterator<Item = Own> + Send,
+    visit: impl Fn(&Band<N>, &List, usize, Own) + Sync,
+) {
     // Triangles that each band may show, in order.
     let mut bands: Vec<List> = Vec::new();
-    bands.resize_with(rows.len().div_ceil(BAND), List::default);
+    bands.resize_with(height.div_ceil(BAND), List::default);
     for number in 0..triangles.count() {
         let [p, q, r] = triangles.corners(number);
-        let of_picture = range([p.y, q.y, r.y], rows.end.min(height));
-        if let Some([first, last]) = of_picture.filter(|[_, last]| *last >= rows.start) {
-            let [first, last] = [first, last].map(|row| row.saturating_sub(rows.start) / BAND);
-            let last = last.min(bands.len().saturating_sub(1));
+        if let Some([first, last]) = range([p.y, q.y, r.y], height) {
             let nearest = f32::MIN.max(p.depth).max(q.depth).max(r.depth);
             let surface = triangles.surface(number);
-            bands[first..=last].iter_mut().for_each(|band| band.push(number as u32, surface, nearest));
+            let bands = &mut bands[first / BAND..=last / BAND];
+            bands.iter_mut().for_each(|band| band.push(number as u32, surface, nearest));
         }
     }
-    let work = Mutex::new(pixels.chunks_mut((BAND * width).max(1)).zip(&bands).enumerate());
+    let work = Mutex::new(own.zip(&bands).enumerate());
     let draw_bands = || {
         let mut band = Band::new(pattern, width);
         let next = || work.lock().unwrap_or_else(PoisonError::into_inner).next();
-        while let Some((index, (pixels, list))) = next() {
-            let top = rows.start + index * BAND;
-            band.draw(triangles, list, top..(top + BAND).min(rows.end));
-            band.resolve(triangles, list, top, pixels);
+        while let Some((index, (own, list))) = next() {
+            let top = index * BAND;
+            band.draw(triangles, list, top..(top + BAND).min(height));
+            visit(&band, list, top, own);
         }
     };
     std::thread::scope(|scope| {
@@ -289,17 +309,13 @@ mod tests {
         [width, height]: [usize; 2],
         triangles: &impl Triangles,
     ) -> Image {
-        let image = |threads, strip: usize| {
+        let image = |threads| {
             let mut pixels = vec![[0; 4]; width * height];
-            for (k, pixels) in pixels.chunks_mut((strip * width).max(1)).enumerate() {
-                let rows = k * strip..((k + 1) * strip).min(height);
-                draw(pattern, threads, [width, height], rows, triangles, pixels);
-            }
+            draw(pattern, threads, [width, height], triangles, &mut pixels);
             Image { width, height, pixels }
         };
-        let whole = image(1, height);
-        assert_eq!(whole, image(3, height));
-        assert_eq!(whole, image(2, 16), "strip by strip");
+        let whole = image(1);
+        assert_eq!(whole, image(3));
         whole
     }
 
