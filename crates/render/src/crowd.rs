@@ -1,15 +1,16 @@
 //! The width of lines to which a model gives none.
 //!
 //! Usually it is a fixed part of the extent of the animation. Where lines are crowded, that would be a blob: figure 1.24 of *The
-//! Algorithmic Beauty of Plants* has 1,500 lines and more. There they are thinner, so that together they cover a twentieth of a square
-//! as large as the extent, or a quarter as wide as what a module draws is long, whichever is wider. The
+//! Algorithmic Beauty of Plants* has 1,500 lines and more. There they are thinner, so that together they cover a twentieth of the box around
+//! everything, or a quarter as wide as what a module draws is long, whichever is wider. The
 //! frame with most lines decides, so all frames of an animation have the same width, and the order in which they are surveyed does not
 //! matter.
 
 use dlsys_geometry::scene::{Bounds, OwnerId, Scene, Width};
 
-/// The part of a square, as large as the extent, that crowded lines may cover.
+/// The part of the two larger sides of the box around everything that crowded lines may cover; a slender box counts as this wide, in parts of its length.
 const INK: f64 = 0.05;
+const SLENDER: f64 = 0.2;
 /// The width of a line, in parts of the mean length of what a module draws, at which crowded lines are still told apart.
 const SLIM: f64 = 0.25;
 /// The least width, in parts of the extent: a pixel of a picture of a thousand.
@@ -49,12 +50,12 @@ impl Crowd {
 
     /// The default width within these bounds, in scene units.
     pub(super) fn default_width(&self, bounds: &Bounds) -> f64 {
-        let (usual, extent) = (bounds.default_width(), bounds.extent());
+        let (usual, [extent, wide, _]) = (bounds.default_width(), bounds.sides());
         if !(self.length > 0.0 && extent > 0.0) {
             return usual;
         }
         let slim = SLIM * self.length / self.modules as f64;
-        (INK * extent * extent / self.length).max(slim).max(LEAST * extent).min(usual)
+        (INK * extent * wide.max(SLENDER * extent) / self.length).max(slim).max(LEAST * extent).min(usual)
     }
 }
 

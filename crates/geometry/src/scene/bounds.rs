@@ -82,9 +82,19 @@ impl Bounds {
         self.points.is_empty()
     }
 
-    /// Largest side of the box around all points, widths not counted; 0 if there is nothing.
+    /// The largest of the [sides](Bounds::sides).
     pub fn extent(&self) -> f64 {
-        if self.is_empty() { 0.0 } else { (self.points.high - self.points.low).max() }
+        self.sides()[0]
+    }
+
+    /// Sides of the box around all points, widths not counted, the largest first; 0 if there is nothing.
+    pub fn sides(&self) -> [f64; 3] {
+        if self.is_empty() {
+            return [0.0; 3];
+        }
+        let mut sides: [f64; 3] = (self.points.high - self.points.low).into();
+        sides.sort_by(|a, b| b.total_cmp(a));
+        sides
     }
 
     /// The default width that goes with these bounds, in scene units: a fixed part of their extent. Where
