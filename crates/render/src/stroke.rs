@@ -19,6 +19,8 @@ const HAIR: f64 = 0.8;
 const NARROW: f64 = 6.0;
 /// Stems thinner than this many pixels of the page are strokes, wherever they are visible, and never regions.
 const THIN: f64 = 2.5;
+/// Lines thinner than this many pixels of the page are strokes with round ends, whatever they join.
+const HAIRLINE: f64 = 1.6;
 /// Places across a stem at which its colour is given: its edges are at -1 and 1.
 const PLACES: [f64; 5] = [-1.0, -0.55, 0.0, 0.55, 1.0];
 /// Least cosine of the angle between two pieces of a straight line.
@@ -190,7 +192,9 @@ impl<'a> Strokes<'a> {
         if ends.iter().any(|end| matches!(end, End::Slant(_))) {
             return outline(slanted([a, b], [wa / 2.0, wb / 2.0], ends));
         }
-        let cuts = [0, 1].map(|k| self.cut(segment, k, ends[k]));
+        // A hairline is round at both ends: that reaches less than a pixel further than a cut, under what continues it.
+        let is_hairline = from == to && wa * pixels < HAIRLINE * scale;
+        let cuts = [0, 1].map(|k| self.cut(segment, k, ends[k]).filter(|_| !is_hairline));
         let end_of_outline = || if ends[1] == End::Straight { overlap(a, b) } else { b };
         if from != to {
             return outline(tapered([a, end_of_outline()], [wa / 2.0, wb / 2.0], cuts));
