@@ -119,6 +119,11 @@ impl<'m> Lit<'m> {
         }
     }
 
+    /// The material of the floor, if there is one.
+    pub(crate) fn floor(&self) -> Option<MaterialId> {
+        self.floor
+    }
+
     /// The picture on a triangle, and where its corners are.
     fn picture(&self, n: usize) -> Option<(&'m Texture, [Pinned; 3])> {
         if self.mesh.places.is_empty() {

@@ -22,6 +22,19 @@ pub struct Outline {
 }
 
 impl Outline {
+    /// Makes it exact where it leaves the edge of an item: there, three regions meet, and a corner that two of them cut off would show what lies
+    /// under both.
+    pub fn keep_junctions(&mut self) {
+        let is_edge = |place: &Place| place.tolerance <= TOLERANCE;
+        for i in 1..self.places.len() {
+            let [a, b] = [is_edge(&self.places[i - 1]), is_edge(&self.places[i])];
+            if a != b {
+                let inside = &mut self.places[if a { i } else { i - 1 }];
+                inside.tolerance = inside.tolerance.min(TOLERANCE_JUNCTION);
+            }
+        }
+    }
+
     /// Its corners; none if it is too small to be seen.
     pub fn simplified(&self) -> Option<Vec<Corner>> {
         Some(simplified(&self.places))
@@ -72,6 +85,8 @@ const STRIP: f64 = 0.4;
 const LEAST_TOLERANCE: f64 = 0.02;
 const TOLERANCE_HIDDEN: f64 = 1.5;
 const TOLERANCE_NEAR_EDGE: f64 = 0.8;
+/// That of the first place within an item.
+const TOLERANCE_JUNCTION: f64 = 0.25;
 
 /// Cosine of the turn at a corner that is sharp, and sine of that at one which is not.
 const SHARP: f64 = -0.3;

@@ -18,13 +18,15 @@ use crate::raster::samples::EIGHT;
 use crate::triangles::{Triangle, Triangles};
 use dlsys_geometry::scene::{MaterialId, OwnerId};
 
-/// Shades between black and a colour as it is; and of what is so large in the picture that the steps between shades would show.
+/// Shades between black and a colour as it is; of what is so large in the picture that the steps between shades would show; and of the floor, on which light changes
+/// so slowly that these would, too.
 pub const SHADES: u8 = 20;
 const FINE_SHADES: u8 = 60;
+const FLOOR_SHADES: u8 = 180;
+/// What covers so many pixels is large.
+const LARGE: f64 = 3000.0;
 /// No step is below this.
 pub const DARKEST: i32 = -256;
-/// What covers so many pixels is large.
-const LARGE: f64 = 10_000.0;
 /// Of so many rows and columns one each is looked at to tell what is large, and what is less wide than so many of those is not: in gaps between
 /// other things no steps show.
 const APART: usize = 4;
@@ -151,7 +153,7 @@ pub fn label(
     let Seen { mesh, around, size: [width, _], .. } = seen;
     let room = [numbers.len(), most];
     let mut item_of = items_of(mesh, stems);
-    shade_finely(mesh, &mut item_of, &numbers, seen.spans, (per_pixel * LARGE) as usize);
+    shade_finely((mesh, seen.lit.floor()), &mut item_of, &numbers, seen.spans, (per_pixel * LARGE) as usize);
     let mut shading = Shading::new(seen.lit);
     let mut cells = Cells {
         labels: numbers,
@@ -185,13 +187,26 @@ pub fn label(
         false => at_edges.samples(&SIXTEEN, &face_items, &mut shading),
     };
     let per_cell = if is_fine { EIGHT.len() } else { SIXTEEN.len() };
+    let is_large = shades.iter().map(|shade| shade.item.shades > SHADES).collect();
     let least =
         shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / f64::from(shade.item.shades)).collect();
     let steps = shades.iter().map(|shade| shade.step).collect();
     let means = shades.iter().map(Shade::strength).collect();
     let around = around.clone();
-    let regions =
-        Regions { width, around, labels, edges, samples, per_cell, items, steps, strengths, least, means };
+    let regions = Regions {
+        width,
+        around,
+        labels,
+        edges,
+        samples,
+        per_cell,
+        items,
+        steps,
+        strengths,
+        least,
+        means,
+        is_large,
+    };
     (regions, shades)
 }
 
@@ -312,9 +327,15 @@ impl Cells {
     }
 }
 
-/// Gives more shades to the looks of surfaces that cover more than so many cells each. Triangles of one look follow one another, and so do
+/// Gives more shades to the looks of large surfaces. Triangles of one look follow one another, and so do
 /// those of one surface.
-fn shade_finely(mesh: &Triangles, items: &mut [Option<Item>], numbers: &[u32], seen: &Spans, large: usize) {
+fn shade_finely(
+    (mesh, floor): (&Triangles, Option<MaterialId>),
+    items: &mut [Option<Item>],
+    numbers: &[u32],
+    seen: &Spans,
+    large: usize,
+) {
     let mut covered = vec![0; items.len() + 1];
     // Nothing is no surface.
     let surface = |number: u32| Some(mesh.faces[(number as usize).checked_sub(1)?].surface);
@@ -335,7 +356,8 @@ fn shade_finely(mesh: &Triangles, items: &mut [Option<Item>], numbers: &[u32], s
             largest = cells.max(largest);
         }
         if largest > large {
-            run.iter_mut().flatten().for_each(|item| item.shades = FINE_SHADES);
+            let shades = |item: &Item| if Some(item.look.1) == floor { FLOOR_SHADES } else { FINE_SHADES };
+            run.iter_mut().flatten().for_each(|item| item.shades = shades(item));
         }
     }
 }

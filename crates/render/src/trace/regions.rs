@@ -19,7 +19,7 @@ const MARGIN: usize = 3;
 /// What has so many of the eight cells around a cell, or fewer, is narrow there.
 const FEW: usize = 2;
 /// By how much light is stronger than the least of a region, so that it is within it: less than half of the finest step.
-const WITHIN: f64 = 0.004;
+const WITHIN: f64 = 0.002;
 
 /// No region.
 pub const NOTHING: u32 = u32::MAX;
@@ -55,6 +55,8 @@ pub struct Regions {
     pub least: Vec<f64>,
     /// By region: the mean of them.
     pub means: Vec<f64>,
+    /// By region: whether it is so large that its outline is exact where it leaves the edge of its item.
+    pub is_large: Vec<bool>,
 }
 
 /// Marks on the cells of a raster, so that they need not be taken away: the last piece that a cell was found to be in, or is covered by, or the last hole
@@ -341,7 +343,10 @@ impl Regions {
                 continue;
             }
             passed.clear();
-            let outline = mask.follow(cell, |cell| passed.push(cell));
+            let mut outline = mask.follow(cell, |cell| passed.push(cell));
+            if self.is_large[label as usize] {
+                outline.keep_junctions();
+            }
             passed.iter().for_each(|cell| marks.on[*cell] = number + 1);
             if !outline.is_hole || !self.fill(cell - self.width, number, label, marks) {
                 outlines.extend(outline.simplified());
@@ -390,6 +395,7 @@ pub(super) mod tests {
             least: vec![0.0; 10],
             means: vec![0.0; 10],
             steps: vec![0; 10],
+            is_large: vec![false; 10],
         }
     }
 
