@@ -5,6 +5,7 @@
 //! is kept as it was before the frames at hand and run again. Simulations give the same bits again, so samples do not depend on the order in which they were taken.
 
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Bound;
 
 use dlsys_geometry::scene::Scene;
 use dlsys_session::Nursery;
@@ -26,8 +27,8 @@ const AT_ONCE: usize = 20_000_000;
 const STRIDE: usize = 4;
 /// Intervals of less than this part of the way from frame to frame, or of the longest way, are not tested.
 const TESTED: f64 = 0.25;
-/// Where an interval is tested, in parts of it.
-const ASIDE: f64 = 0.4;
+/// Where an interval is tested, in parts of it: between these. In another place of each, or a motion to and fro of a round period would be missed in all of them.
+const ASIDE: [f64; 2] = [0.31, 0.45];
 /// Strings that are drawn together, at most.
 const BATCH: usize = 64;
 /// Halvings of an interval, at most.
@@ -200,6 +201,7 @@ impl Follower<'_, '_> {
 
     /// Accepts tests where the straight way passes them; others become samples.
     fn judge(&self, knots: &mut BTreeMap<u64, Knot>, tests: &mut BTreeMap<u64, Sample>) {
+        let mut turning = Vec::new();
         for (at, test) in std::mem::take(tests) {
             let before = knots.range(..at).next_back().map(|(_, knot)| &knot.sample);
             let (Some(before), Some((&after, knot))) = (before, knots.range(at..).next()) else { continue };
@@ -220,11 +222,25 @@ impl Follower<'_, '_> {
                 }
                 let depth = depth + 1;
                 knots.insert(at, Knot { sample: test, depth, done: false, strict: explained, passed: 0 });
+                if explained {
+                    turning.push(after);
+                }
+            }
+        }
+        // The way beside one that is not straight may have passed its test by chance.
+        for after in turning {
+            let next = knots.range((Bound::Excluded(after), Bound::Unbounded)).next();
+            let beside = [next, knots.range(..after).rev().nth(1)].map(|knot| knot.map(|(at, _)| *at));
+            for at in beside.into_iter().flatten() {
+                if let Some(knot) = knots.get_mut(&at).filter(|knot| knot.done && knot.passed == 1) {
+                    (knot.done, knot.strict) = (false, true);
+                }
             }
         }
     }
 
-    /// Times at which intervals are to be tested; those shorter than `long` are taken as they are, if the same things are seen at both ends.
+    /// Times at which intervals are to be tested; those shorter than `long` are taken as they are, if the same things are seen at both ends and
+    /// the way goes on as before.
     fn questions(&self, knots: &mut BTreeMap<u64, Knot>, long: f64) -> Vec<f64> {
         let mut times = Vec::new();
         let mut before: Option<f64> = None;
@@ -238,10 +254,11 @@ impl Follower<'_, '_> {
             let (a, b) = (from.sample.time, to.sample.time);
             let explained = self.is_explained(&from.sample, &to.sample);
             // Not in the middle, where the error of a motion that turns round there is 0.
-            let middle = a + (b - a) * if explained { ASIDE } else { 0.5 };
+            let middle = a + (b - a) * if explained { aside(a, b) } else { 0.5 };
             let is_fine = b - a <= self.closeness.instant || middle <= a || middle >= b;
-            let same = is_fine || explained;
-            if is_fine || to.depth >= DEEPEST || (same && !to.strict && b - a < long) {
+            let is_short =
+                || explained && !to.strict && b - a < long && self.goes_on(knots, &from.sample, &to.sample);
+            if is_fine || to.depth >= DEEPEST || is_short() {
                 done.push(pair[1]);
             } else if before != Some(middle) {
                 before = Some(middle);
@@ -254,6 +271,13 @@ impl Follower<'_, '_> {
             }
         }
         times
+    }
+
+    /// True if the way to a sample continues the one to the sample before it, from one that is about as far from that.
+    fn goes_on(&self, knots: &BTreeMap<u64, Knot>, from: &Sample, to: &Sample) -> bool {
+        let far = from.time - 0.5 * (to.time - from.time);
+        let before = knots.range(..=key(far)).next_back().map(|(_, knot)| &knot.sample);
+        before.is_some_and(|before| before.time < from.time && self.is_straight(before, from, to))
     }
 
     /// True if everything that appears, changes or disappears between two samples is explained by an event.
@@ -356,6 +380,18 @@ impl Follower<'_, '_> {
             self.births.entry(module.lineage.id).or_insert(string.time - module.age);
         }
     }
+}
+
+/// Where an interval is tested, in parts of it.
+fn aside(from: f64, to: f64) -> f64 {
+    // A number that looks random, the same whenever the interval is the same: the finalizer of splitmix64.
+    let mixed = |x: u64| {
+        let x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        x ^ x >> 31
+    };
+    let part = (mixed(from.to_bits() ^ mixed(to.to_bits())) >> 11) as f64 / (1_u64 << 53) as f64;
+    ASIDE[0] + (ASIDE[1] - ASIDE[0]) * part
 }
 
 /// An order of times that are not negative.

@@ -32,6 +32,11 @@ impl Clock {
         self.at(self.last)
     }
 
+    /// A time of the model, given that in the animation.
+    fn time(&self, at: f32) -> f64 {
+        self.first + f64::from(at) / self.seconds
+    }
+
     /// An instant of the animation; what is before it or after it is brought to its ends.
     pub(crate) fn at(&self, time: f64) -> f32 {
         ((time.clamp(self.first, self.last) - self.first) * self.seconds) as f32
@@ -88,7 +93,20 @@ impl Moved<'_> {
             }),
         };
         let (keys, kept) = self.keys(kept.into_iter().map(|i| (times[i], i)));
-        Path { keys, frames: kept.into_iter().map(|i| frames[i]).collect() }
+        let frames = keys.iter().zip(kept).map(|(key, i)| self.frame_at(*key, i)).collect();
+        Path { keys, frames }
+    }
+
+    /// Where it is at a key that was made of a sample, and may have been moved to before that.
+    fn frame_at(&self, key: f32, sample: usize) -> Frame {
+        let (times, frames) = (&self.phase.times, &self.phase.frames);
+        if self.clock.at(times[sample]) <= key {
+            return frames[sample];
+        }
+        let time = self.clock.time(key);
+        let Some(before) = times[..sample].iter().rposition(|at| *at <= time) else { return frames[sample] };
+        let w = weight(times[before], times[before + 1], time);
+        frames[before].between(&frames[before + 1], w)
     }
 
     /// When it begins and ends to be seen: instants, and whether it is seen then, with a linear change between two that differ. Empty if it is seen always.
@@ -108,28 +126,46 @@ impl Moved<'_> {
             let death = death.min(end - APART);
             if death >= from + APART {
                 keys.push((death, true));
+            } else if birth.is_none() {
+                // It is seen in the first picture only.
+                keys.push((0.0, true));
             }
             keys.push((death.max(from) + APART, false));
         }
         keys
     }
 
-    /// Keys of a track, as seconds and what they are made of. Keys in a row that are too near to one another are moved back; what would be before the
-    /// beginning is left out.
+    /// Keys of a track, as seconds and what they are made of. Where they are too near to one another, they are moved back by no more than keys are apart; of those
+    /// for which there is no room even so, the first and the last of a jump stay.
     pub(crate) fn keys<K>(&self, wanted: impl Iterator<Item = (f64, K)>) -> (Vec<f32>, Vec<K>) {
-        let mut all: Vec<(f32, K)> = wanted.map(|(time, key)| (self.clock.at(time), key)).collect();
-        let mut limit = f32::INFINITY;
-        for (time, _) in all.iter_mut().rev() {
-            *time = time.min(limit);
-            limit = *time - APART;
-        }
-        let first = all.iter().position(|(time, _)| *time > -APART / 2.0).unwrap_or(0);
-        all.drain(..first);
-        if let Some((time, _)) = all.first_mut() {
-            *time = time.max(0.0);
-        }
-        all.into_iter().unzip()
+        apart(wanted.map(|(time, key)| (self.clock.at(time), key)).collect())
     }
+}
+
+/// See [`Moved::keys`]; times in seconds, ascending.
+fn apart<K>(all: Vec<(f32, K)>) -> (Vec<f32>, Vec<K>) {
+    /// Most that a key is moved, with its rounding.
+    const FARTHEST: f32 = 1.001 * APART;
+    let mut kept: Vec<(f32, K)> = Vec::with_capacity(all.len());
+    // Before what the last key kept had to be, and the next one has to be.
+    let [mut before, mut limit] = [f32::INFINITY; 2];
+    for (time, key) in all.into_iter().rev() {
+        let has_room = kept.is_empty() || time - time.min(limit) <= FARTHEST && limit > -APART / 2.0;
+        if has_room {
+            before = limit;
+            kept.push((time.min(limit), key));
+        } else if kept.len() > 1
+            && let Some(last) = kept.last_mut()
+        {
+            *last = (time.min(before), key);
+        }
+        limit = kept.last().map_or(limit, |(time, _)| time - APART);
+    }
+    kept.reverse();
+    if let Some((time, _)) = kept.first_mut() {
+        *time = time.max(0.0);
+    }
+    kept.into_iter().unzip()
 }
 
 #[cfg(test)]
@@ -140,6 +176,26 @@ mod tests {
     fn times_are_seconds_from_the_first_frame() {
         let clock = Clock::new(2.0, 6.0, 0.5);
         assert_eq!([1.0, 2.0, 3.0, 6.0, 7.0].map(|t| clock.at(t)), [0.0, 0.0, 0.5, 2.0, 2.0]);
+        assert_eq!(clock.time(2.0), 6.0);
         assert!(!clock.is_still() && Clock::new(1.0, 1.0, 1.0).is_still());
+    }
+
+    #[test]
+    fn keys_stay_where_they_are_however_many_there_are() {
+        // Five in each half of a millisecond; the last two are one instant, before and after a jump.
+        let mut wanted: Vec<(f32, f32)> = (0..10_000).map(|i| (i as f32 * 1e-4, i as f32 * 1e-4)).collect();
+        wanted.push((0.9999, 5.0));
+        let (times, keys) = apart(wanted);
+        assert!(times.len() > 1000 && times[0] < APART);
+        assert!(times.windows(2).all(|pair| pair[1] - pair[0] > 0.99 * APART));
+        let (last, others) = keys.split_last().expect("keys");
+        assert!(
+            *last == 5.0
+                && others.iter().zip(&times).all(|(wanted, time)| (wanted - time).abs() < 1.01 * APART)
+        );
+        assert_eq!(
+            apart(vec![(0.0, 0), (0.5, 1), (0.5, 2), (0.5, 3)]),
+            (vec![0.0, 0.4995, 0.5], vec![0, 1, 3])
+        );
     }
 }

@@ -448,7 +448,7 @@ fn readers(text: &mut Text, path: &str, file: &str, repeats: bool) {
 fn visibility(sight: &[(f64, bool)], is_born: bool) -> Vec<(f64, bool)> {
     let (Some((first, _)), Some((last, seen))) = (sight.first(), sight.last()) else { return Vec::new() };
     let mut all = Vec::new();
-    if *first > 0.0 {
+    if *first > 0.0 || !is_born {
         all.push((0.0, !is_born));
     }
     if is_born {
