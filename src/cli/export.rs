@@ -376,6 +376,10 @@ fn failure(run: &ModelRun, error: &interchange::Error) -> Failure {
         Error::TooLarge { .. } => {
             &["a coarser --accuracy needs fewer numbers; so does a shorter time with `--from A --to B`"]
         }
+        Error::TooManyShapes { .. } => &[
+            "draw what turns in a module of its own: a module is turned as a whole, while turns within its interpretation change its shape",
+            "a coarser --accuracy needs fewer shapes; so does a shorter time with `--from A --to B`",
+        ],
         Error::Bytes { .. } => &[
             "a coarser --accuracy has fewer triangles, and fewer frames (--step) fewer of them",
             "without `--topology varying` shapes are shared by modules, and the file is much smaller",

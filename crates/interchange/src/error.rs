@@ -31,6 +31,14 @@ pub enum Error {
         /// The most that there may be.
         limit: usize,
     },
+    /// A module goes through so many shapes that are sums of no few ones that their weights are more numbers than fit into memory.
+    #[error("module `{kind}` goes through {shapes} shapes, none of which is a sum of few others")]
+    TooManyShapes {
+        /// The kind of the module.
+        kind: String,
+        /// The number of its shapes.
+        shapes: usize,
+    },
     /// The file would be larger than a GLB file can be.
     #[error("the file would have {bytes} bytes, and a GLB file has at most 4 GiB")]
     File {

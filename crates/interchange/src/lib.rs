@@ -272,7 +272,7 @@ pub fn grow(
     gases.extend(particles);
     let allowed =
         Tolerance { likeness: 0.25 * tolerance, mix: 0.08 * tolerance, mix_of_nets: 0.4 * tolerance };
-    let lives = life::lives(&tracks.phases, allowed, 2.0 * instant);
+    let lives = life::lives(&tracks.phases, allowed, 2.0 * instant, numbers)?;
     Ok(Growth {
         title: model.title.clone().unwrap_or_else(|| session.source.name.clone()),
         first,

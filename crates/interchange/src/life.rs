@@ -5,6 +5,7 @@
 
 use std::collections::HashMap;
 
+use crate::Error;
 use crate::blend::{Example, blend};
 use crate::part::{Form, Paint, Part, distance, triple};
 use crate::stem::SIZES;
@@ -126,7 +127,10 @@ impl Phase {
 }
 
 /// Finds the lives of phases. `slack` is how far apart in time the same appearance may be found for two modules.
-pub(crate) fn lives(phases: &[Phase], tolerance: Tolerance, slack: f64) -> Lives {
+///
+/// # Errors
+/// If a life would have more than `most` weights.
+pub(crate) fn lives(phases: &[Phase], tolerance: Tolerance, slack: f64, most: usize) -> Result<Lives, Error> {
     let span = |i: &usize| phases[*i].times.last().unwrap_or(&0.0) - phases[*i].times.first().unwrap_or(&0.0);
     let mut order: Vec<usize> = (0..phases.len()).collect();
     order.sort_by(|a, b| span(b).total_cmp(&span(a)).then(a.cmp(b)));
@@ -151,20 +155,21 @@ pub(crate) fn lives(phases: &[Phase], tolerance: Tolerance, slack: f64) -> Lives
         true => tolerance.mix_of_nets,
         false => tolerance.mix,
     };
-    let lives = models.into_iter().map(|(i, ages)| life(i, &phases[i], &ages, mix(&phases[i]))).collect();
-    Lives { lives, of_phase }
+    let lives = models.into_iter().map(|(i, ages)| life(i, &phases[i], &ages, mix(&phases[i]), most));
+    Ok(Lives { lives: lives.collect::<Result<_, Error>>()?, of_phase })
 }
 
-fn life(model: usize, phase: &Phase, ages: &[f64], tolerance: f64) -> Life {
+fn life(model: usize, phase: &Phase, ages: &[f64], tolerance: f64, most: usize) -> Result<Life, Error> {
     let (ages, shape) = match &phase.form[..] {
         [Part::Stem(contour)] => stem(phase, ages, (*contour, false), tolerance),
         [Part::Shoot(contour)] => stem(phase, ages, (*contour, true), tolerance),
-        _ => still(phase, ages, tolerance)
-            .or_else(|| line(phase, ages, tolerance))
-            .unwrap_or_else(|| mixed(phase, ages, tolerance)),
+        _ => match still(phase, ages, tolerance).or_else(|| line(phase, ages, tolerance)) {
+            Some(found) => found,
+            None => mixed(phase, ages, tolerance, most)?,
+        },
     };
     let (form, paint, kind) = (phase.form.clone(), phase.paint().clone(), phase.kind.clone());
-    Life { form, paint, kind, ages, shape, model }
+    Ok(Life { form, paint, kind, ages, shape, model })
 }
 
 /// One shape, if all are near to one.
@@ -214,30 +219,30 @@ fn line(phase: &Phase, ages: &[f64], tolerance: f64) -> Option<(Vec<f64>, Shape)
     Some((kept.iter().map(|&i| ages[i]).collect(), shape))
 }
 
-/// Shapes at ages, or, if these are fewer, shapes of which those at all ages are sums.
-fn mixed(phase: &Phase, ages: &[f64], tolerance: f64) -> (Vec<f64>, Shape) {
-    let (keys, shape) = hats(phase, ages, tolerance);
-    let numbers: Vec<&[f32]> = (0..ages.len()).map(|i| phase.numbers(i)).collect();
-    blend(&phase.form, ages, &numbers, keys.len().saturating_sub(1), tolerance).unwrap_or((keys, shape))
-}
-
-/// Shapes at ages between which straight lines are near enough.
-fn hats(phase: &Phase, ages: &[f64], tolerance: f64) -> (Vec<f64>, Shape) {
+/// Shapes at ages between which straight lines are near enough, or, if these are fewer, shapes of which those at all ages are sums.
+fn mixed(phase: &Phase, ages: &[f64], tolerance: f64, most: usize) -> Result<(Vec<f64>, Shape), Error> {
     let kept = thin(ages.len(), |i, j| {
         (i + 1..j).all(|k| {
             let w = (ages[k] - ages[i]) / (ages[j] - ages[i]);
             distance(&phase.form, [phase.numbers(i), phase.numbers(j)], w, phase.numbers(k)) <= tolerance
         })
     });
+    let count = kept.len();
+    let numbers: Vec<&[f32]> = (0..ages.len()).map(|i| phase.numbers(i)).collect();
+    if let Some(found) = blend(&phase.form, ages, &numbers, count.saturating_sub(1), tolerance) {
+        return Ok(found);
+    }
+    if count.saturating_mul(count) > most {
+        return Err(Error::TooManyShapes { kind: phase.kind.to_string(), shapes: count });
+    }
     // The last shape, the mature one, is that of the mesh itself.
     let shapes: Vec<Vec<f32>> = kept.iter().rev().map(|&i| phase.numbers(i).to_vec()).collect();
-    let count = kept.len();
     let mut weights = vec![0.0; count * (count - 1)];
     for key in 0..count - 1 {
         // Shape 1 is the last but one.
         weights[key * (count - 1) + (count - 2 - key)] = 1.0;
     }
-    (kept.iter().map(|&i| ages[i]).collect(), Shape::Mixed { shapes, weights, examples: Vec::new() })
+    Ok((kept.iter().map(|&i| ages[i]).collect(), Shape::Mixed { shapes, weights, examples: Vec::new() }))
 }
 
 /// A straight stem: its lengths and its radii are enough.
