@@ -75,6 +75,8 @@ pub enum Action {
     /// the slowest. The observed order is the slope of error against step size or, for methods with step
     /// control, against evaluations of the right-hand side.
     ///
+    /// Each method has an equal part of --budget; points that do not fit are left out, and the report says so.
+    ///
     /// For a model with tissues, a second table has the error of drawn positions against work, for each method and tolerance
     /// of bending.
     ///
@@ -372,9 +374,13 @@ pub struct ReportArgs {
     pub settings: Vec<Setting>,
     #[command(flatten)]
     pub include: IncludeArgs,
-    /// Timed runs of each point, of which the median is shown; fewer where they take more than 0.2 seconds
+    /// Timed runs of each point, of which the median is shown; fewer where they take more than 0.2 seconds, or where there is no time
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = runs)]
     pub runs: usize,
+    /// Seconds for the points of all methods, an equal part for each; points that do not fit are left out, and it is said how long they
+    /// would take. What --tolerances, --step-sizes and --slices list is measured in any case, and the runs that all are compared with come on top
+    #[arg(long = "budget", value_name = "S", allow_negative_numbers = true, default_value = "4", value_parser = positive)]
+    pub study_budget: f64,
     /// Seconds that a run may take; a point that would take longer, judged from the one before, is left out
     #[arg(long, value_name = "S", allow_negative_numbers = true, default_value = "10", value_parser = positive)]
     pub time_limit: f64,

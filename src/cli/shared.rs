@@ -18,6 +18,8 @@ use crate::study::method_name;
 #[derive(Clone, Copy, Debug, Args)]
 pub struct BudgetArgs {
     /// More modules than this are an error
+    ///
+    /// A number above 10 million also allows a frame to be drawn with so many, those of interpretations included.
     #[arg(long, value_name = "N", default_value_t = Settings::MODULES)]
     pub max_modules: usize,
     /// More productions and steps than this are an error, such as 1e12

@@ -100,3 +100,22 @@ fn the_suggested_production_can_be_pasted() {
         run(&format!("{model}  {clause}\n")).expect(clause);
     }
 }
+
+/// Polygons mean what they mean in cpfg, wherever they stand, and a subscript says that the command of this language is meant.
+#[test]
+fn what_is_meant_gets_no_warning() {
+    let polygon = "{ -(22) f(1) +(22) f(1) | -(22) f(1) . }";
+    for text in [
+        format!("initial string: F {polygon} F"),
+        format!("initial string: A\nA: if age = 1 produce F {polygon} A"),
+        format!("initial string: A\nA -> F {polygon} A"),
+        format!("initial string: A\ninterpret A: F {polygon}"),
+        "initial string: !(1) F !_s F".to_owned(),
+    ] {
+        let session = Session::from_text("meant.dls", &text, &[]).expect("good");
+        assert!(session.warnings.is_empty(), "{text}: {:?}", session.warnings);
+        let without = text.replace("!_s", "! ");
+        let session = Session::from_text("meant.dls", &without, &[]).expect("good");
+        assert_eq!(session.warnings.len(), usize::from(text != without), "{without}");
+    }
+}

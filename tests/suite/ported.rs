@@ -43,7 +43,7 @@ fn the_monopodial_tree_has_the_segments_of_the_book() {
     let trunk = (1.0 - 0.9f64.powi(10)) / (1.0 - 0.9);
     assert!((tree.highest() - trunk).abs() < 1e-12, "{} instead of {trunk}", tree.highest());
     // Widths are contracted by 0.707: Leonardo's rule.
-    let widths: Vec<f64> = tree.modules.iter().filter(|(name, _)| name == "!").map(|(_, w)| w[0]).collect();
+    let widths: Vec<f64> = tree.modules.iter().filter(|(name, _)| name == "@W").map(|(_, w)| w[0]).collect();
     let least = widths.iter().copied().fold(f64::MAX, f64::min);
     assert!((least - 0.1 * 0.707f64.powi(9)).abs() < 1e-15);
 }
@@ -55,7 +55,7 @@ fn the_ternary_tree_has_rules_for_symbols() {
     assert_eq!((tree.count("A"), tree.count("F")), (729, 1 + 2 * (729 - 1)));
     let trunk = tree.modules.iter().find(|(name, _)| name == "F").map(|(_, length)| length[0]);
     assert!((trunk.expect("a trunk") - 200.0 * 1.109f64.powi(6)).abs() < 1e-9);
-    let width = tree.modules.iter().find(|(name, _)| name == "!").map(|(_, width)| width[0]);
+    let width = tree.modules.iter().find(|(name, _)| name == "@W").map(|(_, width)| width[0]);
     assert!((width.expect("a width") - 1.732f64.powi(6)).abs() < 1e-9);
 }
 

@@ -195,6 +195,35 @@ fn runs_that_fail_or_take_too_long_do_not_stop_a_report() {
     assert!(table.contains("FAILED: stopped after 1 s, at t = "), "{table}");
 }
 
+#[test]
+fn a_report_keeps_within_its_time_and_says_what_it_left_out() {
+    let common = ["models/leaf.dls", "--runs", "1", "--at", "1"];
+    let table = good(&[&common[..], &["--budget", "0.001"]].concat());
+    let left_out = table.matches("left out: would take about").count();
+    assert!(
+        left_out > 10
+            && table.contains(&format!("\n{left_out} points left out to stay within 0.001 s; `--budget ")),
+        "{table}"
+    );
+    let (rows, orders) = (table.matches("  right\n").count(), table.matches("\n  reference: ").count());
+    assert!(orders == 6 && rows >= orders, "of each method the first point is there: {table}");
+    // What is listed is measured, whatever time it takes.
+    let listed = [
+        "--budget",
+        "0.001",
+        "--methods",
+        "dopri5,rk4",
+        "--tolerances",
+        "1e-3,1e-6,1e-9",
+        "--step-sizes",
+        "0.1,0.01",
+    ];
+    let table = good(&[&common[..], &listed].concat());
+    assert!(!table.contains("left out") && table.matches("  right\n").count() == 5, "{table}");
+    let table = good(&[&common[..], &["--budget", "1000"]].concat());
+    assert!(!table.contains("left out") && table.matches("  right\n").count() == left_out + rows, "{table}");
+}
+
 /// Runs the hard cases of a folder with one file.
 fn hard(file: &str) -> (Option<i32>, String, String) {
     let folder = tempfile::tempdir().expect("a folder");

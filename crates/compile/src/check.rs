@@ -350,6 +350,7 @@ pub fn inert_modules(
                         Diagnostic::warning(format!("module `{name}` does nothing"))
                             .at(first(), "no rule, no drawing, no context mentions it")
                             .help_opt(foreign_syntax::module(name).map(str::to_owned))
+                            .help_opt(foreign_syntax::subscript(name))
                             .help(format!(
                                 "a module that only marks a place is declared with `interpret {name}: ε`"
                             )),

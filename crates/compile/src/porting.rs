@@ -53,8 +53,8 @@ pub fn strays(document: &Document, diagnostics: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Warns of turns in the initial string to which a rule for `±` applies, and of symbols without a parameter in a model
-/// with discrete rules, where cpfg does something else.
+/// Warns of turns in the initial string to which a rule for `±` applies, and of symbols whose parameters, or the lack of them, mean
+/// something else in cpfg.
 pub fn strings(document: &Document, written: &[&ast::Rule], diagnostics: &mut Vec<Diagnostic>) {
     let axioms = document.items.iter().filter_map(|(item, _)| match item {
         Item::Axiom(modules) => Some(modules),
@@ -70,7 +70,9 @@ pub fn strings(document: &Document, written: &[&ast::Rule], diagnostics: &mut Ve
             Action::Solve(_) => None,
         });
     let all = axioms.clone().chain(drawings).flat_map(|parts| modules_of(parts)).chain(successors.flatten());
-    diagnostics.extend(all.filter_map(|module| of_parameters(module, &document.expressions)).take(MOST));
+    let all: Vec<&ast::Module> = all.collect();
+    let of_cpfg = all.iter().filter_map(|module| of_parameters(module, &document.expressions));
+    diagnostics.extend(of_cpfg.take(MOST));
     // A subscript says which turns are meant.
     let both: Vec<&&ast::Rule> = written.iter().filter(|rule| &*rule.predecessor.name.text == "±").collect();
     for module in axioms.flat_map(|parts| modules_of(parts)) {
@@ -83,22 +85,20 @@ pub fn strings(document: &Document, written: &[&ast::Rule], diagnostics: &mut Ve
             break;
         }
     }
-    if !written.iter().any(|rule| rule.discrete) {
-        return;
+    if let Some(module) = all.iter().find(|module| &*module.name == "!" && module.arguments.is_empty()) {
+        diagnostics.push(thinner(module, written.iter().any(|rule| rule.discrete)));
     }
-    let successors =
-        written.iter().flat_map(|rule| &rule.clauses).filter_map(|clause| match &clause.action {
-            Action::Produce(all) => Some(all.iter().flat_map(|alternative| modules_of(&alternative.modules))),
-            Action::Solve(_) => None,
-        });
-    let thinner = successors.flatten().find(|module| &*module.name == "!" && module.arguments.is_empty());
-    if let Some(module) = thinner {
-        diagnostics.push(
-            Diagnostic::warning("`!` without a parameter multiplies the width by 0.7")
-                .at(module.span, "cpfg and L-Py subtract a step from the width here")
-                .help("write the width, `!(w)`, with a parameter that carries it: `A(l, w) -> !(w) F(l) A(l, w - 0.1)`"),
-        );
-    }
+}
+
+fn thinner(module: &ast::Module, discrete: bool) -> Diagnostic {
+    let carried = match discrete {
+        true => "`A(l, w) -> !(w) F(l) A(l, w - 0.1)`",
+        false => "`A(l, w): if age = 1 produce !(w) F(l) A(l, w - 0.1)`",
+    };
+    Diagnostic::warning("`!` without a parameter multiplies the width by 0.7")
+        .at(module.span, "cpfg and L-Py subtract a step from the width here")
+        .help(format!("write the width, `!(w)`, with a parameter that carries it: {carried}"))
+        .help("where 0.7 times the width is meant, a subscript says so: `!_s`")
 }
 
 /// The warning for a parameter that cpfg gives a meaning that it does not have here.

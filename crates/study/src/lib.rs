@@ -38,6 +38,7 @@ mod hard;
 mod order;
 mod passive;
 mod plot;
+mod points;
 mod record;
 mod reference;
 mod sheets;

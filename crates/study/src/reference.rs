@@ -1,10 +1,11 @@
 //! The reference of a method: the closed form if the whole model has one, otherwise the run of another method with the
-//! tightest tolerance, with an estimate of its own error from a third method.
+//! tightest tolerance, with an estimate of its own error from a second one, which may be the judged method: nobody judges
+//! himself, but two tight runs serve all methods.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use super::compare::compare;
+use super::compare::{Comparison, compare};
 use super::order::nominal_order;
 use super::record::{Accuracy, Record, Setup, Task, method_name};
 use dlsys_session::Session;
@@ -91,44 +92,35 @@ impl<'a> References<'a> {
             }
         }
         let mut why = String::from("there is no other method of sufficient order");
-        let mut found: Vec<(Method, Rc<Record>)> = Vec::new();
-        for method in candidates(judged) {
-            // What `auto` does is what one of the others does: that one is not another method.
-            let own = (judged == Method::Auto).then(|| self.run(judged, false));
+        let own = (judged == Method::Auto).then(|| self.run(judged, false));
+        let mut found = None;
+        for method in candidates().into_iter().filter(|method| *method != judged) {
             let record = self.run(method, false);
-            if own.is_some_and(|own| own.is_same_run(&record)) {
+            // What `auto` does is what one of the others does: that one is not another method.
+            if own.as_ref().is_some_and(|own| own.is_same_run(&record)) {
                 continue;
             }
             match &record.stop {
-                Some(stop) if found.is_empty() => why = format!("{}: {stop}", self.setup(method, false)),
-                Some(_) => {}
-                None => found.push((method, record)),
-            }
-            if found.len() == 2 {
-                break;
+                Some(stop) => why = format!("{}: {stop}", self.setup(method, false)),
+                None => {
+                    found = Some((method, record));
+                    break;
+                }
             }
         }
-        let independent = !found.is_empty();
-        if !independent {
-            let record = self.run(judged, false);
-            if record.stop.is_some() {
-                return Err(why);
-            }
-            found.push((judged, record));
-        }
-        let mut found = found.into_iter();
-        let (method, record) = found.next().ok_or_else(|| why.clone())?;
-        let (other, check) = match found.next() {
-            Some((other, record)) => (record, self.setup(other, false).to_string()),
+        let independent = found.is_some();
+        let (method, record) = match found {
+            Some(found) => found,
             None => {
-                let relaxed = self.setup(method, true);
-                // There is no third method: the same one, asked for less.
-                (self.run(method, true), relaxed.to_string())
+                let record = self.run(judged, false);
+                if record.stop.is_some() {
+                    return Err(why);
+                }
+                (judged, record)
             }
         };
         let setup = self.setup(method, false);
-        let slack = Reference::slack(setup);
-        let compared = compare(&self.task.session.model, &other, &record, slack);
+        let (compared, check) = self.check(method, judged, independent, &record);
         let doubt = if compared.agreement.is_right() {
             String::new()
         } else {
@@ -137,6 +129,37 @@ impl<'a> References<'a> {
         let own = if independent { String::new() } else { format!(" (NO OTHER METHOD: {why})") };
         let check = format!("{check}{doubt}{own}");
         Ok(Reference { setup, record, error: compared.error, check, is_closed_form: false })
+    }
+
+    /// Compares the reference with another tight run, which is described: the best there is, which serves most methods. One of the judged
+    /// method that disagrees says nothing about which of them is wrong, so that a third is asked then.
+    fn check(
+        &mut self,
+        method: Method,
+        judged: Method,
+        independent: bool,
+        record: &Record,
+    ) -> (Comparison, String) {
+        let task = self.task;
+        let slack = Reference::slack(self.setup(method, false));
+        let compared = |other: &Record| compare(&task.session.model, other, record, slack);
+        let mut doubtful = None;
+        for other in candidates().into_iter().filter(|other| independent && *other != method) {
+            let run = self.run(other, false);
+            if run.stop.is_some() {
+                continue;
+            }
+            let found = (compared(&run), self.setup(other, false).to_string());
+            if other != judged || found.0.agreement.is_right() {
+                return found;
+            }
+            doubtful = Some(found);
+        }
+        doubtful.unwrap_or_else(|| {
+            // There is no other method: the same one, asked for less.
+            let run = self.run(method, true);
+            (compared(&run), self.setup(method, true).to_string())
+        })
     }
 
     /// The tight setup of a method; relaxed, ten times the tolerance or twice the step.
@@ -157,15 +180,15 @@ impl<'a> References<'a> {
     }
 }
 
-/// Methods that can be the reference of another, the best first: with step control before those without, then
+/// Methods that can be a reference, the best first: with step control before those without, then
 /// by order. Not `auto`, which is one of the others; and Euler's method is the truth about nothing.
-fn candidates(judged: Method) -> Vec<Method> {
+fn candidates() -> Vec<Method> {
     let rank =
         |method: Method| (method.is_fixed_step(), std::cmp::Reverse(nominal_order(method_name(method))));
     let mut all: Vec<Method> = Method::NAMED
         .iter()
         .map(|(_, method)| *method)
-        .filter(|m| *m != judged && *m != Method::Auto && nominal_order(method_name(*m)) >= Some(4))
+        .filter(|m| *m != Method::Auto && nominal_order(method_name(*m)) >= Some(4))
         .collect();
     all.sort_by_key(|m| rank(*m));
     all

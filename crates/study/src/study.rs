@@ -1,9 +1,12 @@
 //! A work-precision study of one model: every method at every accuracy, with errors, wall times and counts.
 
-use super::compare::{Agreement, compare};
+use std::time::Instant;
+
+use super::compare::Agreement;
 use super::error::Error;
 use super::order::{nominal_order, observed_order};
-use super::record::{Accuracy, Setup, Task, method_name};
+use super::points::{self, Limits, Share};
+use super::record::{Accuracy, Task, method_name};
 use super::reference::{Reference, References};
 use dlsys_session::Session;
 use dlsys_sim::{Method, Stats};
@@ -13,8 +16,8 @@ use dlsys_sim::{Method, Stats};
 pub struct Plan {
     /// Methods to compare, in this order.
     pub methods: Vec<Method>,
-    /// Tolerances of methods with step control.
-    pub tolerances: Vec<f64>,
+    /// Tolerances of methods with step control; `None` for [`Plan::default_tolerances`].
+    pub tolerances: Option<Vec<f64>>,
     /// Step sizes of methods with a fixed step; `None` for [`Plan::default_step_sizes`].
     pub step_sizes: Option<Vec<f64>>,
     /// Slices of the scheduler `local`, which is also studied if modules read neighbours; `None` for ten powers of two.
@@ -25,6 +28,9 @@ pub struct Plan {
     pub runs: usize,
     /// Allowed wall time of a single run in seconds.
     pub time_limit: f64,
+    /// Seconds for the points of all methods whose accuracies are not listed, an equal part for each. Points that do not fit are left
+    /// out. The runs that all are compared with come on top.
+    pub budget: f64,
     /// Settings of all runs but for method and accuracy, such as limits.
     pub base: dlsys_sim::Settings,
 }
@@ -71,7 +77,7 @@ pub struct Wall {
 }
 
 impl Wall {
-    fn of(mut seconds: Vec<f64>) -> Wall {
+    pub(super) fn of(mut seconds: Vec<f64>) -> Wall {
         seconds.sort_by(f64::total_cmp);
         let n = seconds.len();
         let at = |i: usize| seconds.get(i).copied().unwrap_or(0.0);
@@ -86,17 +92,32 @@ impl Wall {
 }
 
 impl Plan {
+    /// The accuracies of a method, or of the scheduler `local`, and whether they are listed. `end` is the last time.
+    fn accuracies(&self, method: Method, name: &str, end: f64) -> (Vec<Accuracy>, bool) {
+        let (listed, accuracy): (_, fn(f64) -> Accuracy) = match method.is_fixed_step() {
+            _ if name == LOCAL => (&self.slices, Accuracy::Slice),
+            true => (&self.step_sizes, Accuracy::StepSize),
+            false => (&self.tolerances, Accuracy::Tolerance),
+        };
+        let default = || match method.is_fixed_step() {
+            _ if name == LOCAL => Plan::default_step_sizes(end, None),
+            true => Plan::default_step_sizes(end, nominal_order(name)),
+            false => Plan::default_tolerances(),
+        };
+        let values = listed.clone().unwrap_or_else(default);
+        (values.into_iter().map(accuracy).collect(), listed.is_some())
+    }
+
+    /// The methods with their names, and the scheduler `local` where modules read neighbours.
+    fn named(&self, session: &Session) -> Vec<(Method, &'static str)> {
+        let local = reads_context(session).then_some((Method::Auto, LOCAL));
+        self.methods.iter().map(|&method| (method, method_name(method))).chain(local).collect()
+    }
+
     /// Number of calls of `watch` in [`study`], if no point is left out.
     pub fn points(&self, session: &Session) -> usize {
-        let steps = |given: &Option<Vec<f64>>, order| {
-            given.as_ref().map_or_else(|| Plan::default_step_sizes(1.0, order).len(), Vec::len)
-        };
-        let of_method = |method: &Method| match method.is_fixed_step() {
-            true => 1 + steps(&self.step_sizes, nominal_order(method_name(*method))),
-            false => 1 + self.tolerances.len(),
-        };
-        let local = if reads_context(session) { 1 + steps(&self.slices, None) } else { 0 };
-        self.methods.iter().map(of_method).sum::<usize>() + local
+        let all = self.named(session);
+        all.into_iter().map(|(method, name)| 1 + self.accuracies(method, name, 1.0).0.len()).sum()
     }
 }
 
@@ -168,9 +189,24 @@ pub struct Study {
     pub series: Vec<Series>,
 }
 
-/// No more timed runs of a point once they have taken so many seconds. The times of shorter runs vary more, and more of them
-/// are needed for a median; one run of this length is known well enough.
-const LONG: f64 = 0.2;
+impl Study {
+    /// How many points were left out though a run of each would have taken less than `limit` seconds, and about which
+    /// [`budget`](Plan::budget) has time for all; `None` if there are none.
+    pub fn left_out(&self, limit: f64) -> Option<(usize, f64)> {
+        let expected = |point: &Point| point.result.as_ref().err().copied();
+        let all = self.series.iter().flat_map(|series| &series.points);
+        let count = all.filter_map(expected).filter(|seconds| *seconds < limit).count();
+        let seconds = |point: &Point| match &point.result {
+            Ok(outcome) => outcome.wall.median,
+            // With the time for it, it would be left out still.
+            Err(expected) if *expected >= limit => 0.0,
+            Err(expected) => *expected,
+        };
+        let series = self.series.iter().map(|one| (one.points.iter().map(seconds).sum(), one.points.len()));
+        let series: Vec<(f64, usize)> = series.collect();
+        (count > 0).then(|| (count, points::enough(&series)))
+    }
+}
 
 /// Makes all runs of a study. `watch` is called before each point with a description of it, `done` after each method
 /// with the study so far.
@@ -196,8 +232,9 @@ pub fn study(
         runs: plan.runs,
         series: Vec::new(),
     };
-    let local = reads_context(session).then_some((Method::Auto, LOCAL));
-    let all = plan.methods.iter().map(|&method| (method, method_name(method))).chain(local);
+    let all = plan.named(session);
+    let are_listed = |(method, name): &(Method, &str)| plan.accuracies(*method, name, task.end()).1;
+    let mut share = Share::new(plan.budget, all.iter().filter(|series| !are_listed(series)).count());
     for (method, name) in all {
         watch(&format!("{name}: reference"));
         let reference = references.of(method).map_err(Error::NoReference)?;
@@ -205,76 +242,20 @@ pub fn study(
             (study.events, study.modules) = (reference.record.stats.events, reference.record.stats.modules);
         }
         let order = nominal_order(name);
-        let mut accuracies: Vec<Accuracy> = if name == LOCAL {
-            let slices = plan.slices.clone();
-            let slices = slices.unwrap_or_else(|| Plan::default_step_sizes(task.end(), None));
-            slices.into_iter().map(Accuracy::Slice).collect()
-        } else if method.is_fixed_step() {
-            let steps = plan.step_sizes.clone();
-            let steps = steps.unwrap_or_else(|| Plan::default_step_sizes(task.end(), order));
-            steps.into_iter().map(Accuracy::StepSize).collect()
-        } else {
-            plan.tolerances.iter().map(|&tolerance| Accuracy::Tolerance(tolerance)).collect()
-        };
-        // The cheapest first: from it the cost of the next is known.
-        accuracies.sort_by(|a, b| b.value().total_cmp(&a.value()));
-        let mut points: Vec<Point> = Vec::new();
-        for accuracy in accuracies {
-            let expected = expected_seconds(&points, accuracy, order);
-            if expected >= plan.time_limit {
-                points.push(Point { accuracy, result: Err(expected) });
-                continue;
-            }
-            let setup = Setup { method, accuracy };
-            watch(&setup.to_string());
-            points.push(Point { accuracy, result: Ok(outcome(task, setup, &reference, plan.runs)) });
+        let (accuracies, listed) = plan.accuracies(method, name, task.end());
+        let series = if listed { f64::INFINITY } else { share.next() };
+        let limits = Limits { run: plan.time_limit, series };
+        let begun = Instant::now();
+        let common = points::Series { task, method, order, reference: &reference, runs: plan.runs };
+        let points = common.points(accuracies, limits, watch);
+        if !listed {
+            share.spend(begun.elapsed().as_secs_f64());
         }
         let observed = observe(&points, order, &reference);
         study.series.push(Series { method, name, order, observed, reference, points });
         done(&study);
     }
     Ok(study)
-}
-
-/// One run for the answers, then some for the time.
-fn outcome(task: Task<'_>, setup: Setup, reference: &Reference, runs: usize) -> Outcome {
-    let record = task.record(setup, true);
-    let model = &task.session.model;
-    let comparison = compare(model, &record, &reference.record, Reference::slack(setup));
-    let mut seconds = Vec::new();
-    if record.stop.is_none() && record.seconds < LONG {
-        let mut spent = 0.0;
-        while seconds.len() < runs && spent < LONG {
-            let taken = task.time(setup);
-            spent += taken;
-            seconds.push(taken);
-        }
-    }
-    if seconds.is_empty() {
-        seconds.push(record.seconds);
-    }
-    Outcome {
-        error: comparison.error,
-        agreement: comparison.agreement,
-        wall: Wall::of(seconds),
-        stats: record.stats,
-    }
-}
-
-/// How long the next point will take, judged from the ones before it: by the last two, or by the order.
-/// 0 if nothing is known.
-fn expected_seconds(points: &[Point], next: Accuracy, order: Option<u32>) -> f64 {
-    let Some(last) = points.last() else { return 0.0 };
-    let taken = match &last.result {
-        Ok(outcome) => outcome.wall.median,
-        Err(expected) => *expected,
-    };
-    let finer = (last.accuracy.value() / next.value()).max(1.0);
-    let exponent = match next {
-        Accuracy::StepSize(_) | Accuracy::Slice(_) => 1.0,
-        Accuracy::Tolerance(_) => 1.0 / f64::from(order.unwrap_or(5)),
-    };
-    taken * finer.powf(exponent)
 }
 
 /// Runs with less than so many times the least work are left out of the order.
@@ -324,12 +305,13 @@ mod tests {
         let plan = Plan {
             methods: Method::NAMED.iter().map(|(_, m)| *m).collect(),
             // Errors at single tolerances scatter by a factor of ten around the law; many of them show it.
-            tolerances: (12..=44).map(|k| 10f64.powf(-0.25 * f64::from(k))).collect(),
+            tolerances: Some((12..=44).map(|k| 10f64.powf(-0.25 * f64::from(k))).collect()),
             step_sizes: None,
             slices: None,
             times: (1..=60).map(f64::from).collect(),
             runs: 1,
             time_limit: 10.0,
+            budget: f64::INFINITY,
             base: dlsys_sim::Settings { max_modules: 100, ..Default::default() },
         };
         let study = study(&session, "order", &plan, &mut |_| (), &mut |_| ()).expect("a study");
@@ -341,25 +323,5 @@ mod tests {
                 assert!((0.6..1.3).contains(&ratio), "{}: order {observed}", series.name);
             }
         }
-    }
-
-    #[test]
-    fn a_long_point_is_left_out() {
-        let point = |tolerance, seconds: f64| Point {
-            accuracy: Accuracy::Tolerance(tolerance),
-            result: Ok(Outcome {
-                error: None,
-                agreement: Agreement::Right,
-                wall: Wall::of(vec![seconds]),
-                stats: Stats::default(),
-            }),
-        };
-        let expected = expected_seconds(&[point(1e-3, 1.0)], Accuracy::Tolerance(1e-8), Some(5));
-        assert!((expected - 10.0).abs() < 1e-9);
-        let halved = expected_seconds(&[point(0.5, 3.0)], Accuracy::StepSize(0.25), Some(4));
-        assert!((halved - 6.0).abs() < 1e-9);
-        assert_eq!(expected_seconds(&[], Accuracy::StepSize(0.25), Some(4)), 0.0);
-        let wall = Wall::of(vec![3.0, 1.0, 2.0, 6.0]);
-        assert_eq!((wall.median, wall.min, wall.max, wall.spread()), (2.5, 1.0, 6.0, 1.0));
     }
 }

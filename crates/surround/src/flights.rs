@@ -309,6 +309,7 @@ pub(crate) fn pruned(string: &ModuleString, is_needed: impl Fn(Module) -> bool) 
     }
     let mut way = ModuleString::default();
     way.reset(string.time);
+    way.set_run_limit(string.drawn_limit());
     for module in kept.into_iter().map(|place| string.get(place)) {
         way.push(module.kind, module.parameters.iter().copied(), module.age, module.lineage);
     }

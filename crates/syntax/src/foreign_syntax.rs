@@ -138,11 +138,12 @@ pub fn stands_alone(word: &str) -> bool {
     .contains(&word)
 }
 
-/// The counterpart of a symbol of a string in cpfg or L-Py that is none here, given the text from the symbol on and whether
-/// it touches a symbol before it.
-pub fn symbol(text: &str, after_symbol: bool) -> Option<String> {
+/// The counterpart of a symbol of a string in cpfg or L-Py that is none here, given the text before it and from it on.
+pub fn symbol(before: &str, text: &str) -> Option<String> {
     let first = text.chars().next()?;
     let rest = &text[first.len_utf8()..];
+    let is_digit = |c: char| c.is_ascii_digit();
+    let after_symbol = before.ends_with(|c: char| !(c.is_alphanumeric() || c == ')' || c.is_whitespace()));
     let arguments = || {
         let end = rest.starts_with('(').then(|| rest.find(')')).flatten();
         end.map_or("(n)", |end| &rest[..=end])
@@ -173,14 +174,58 @@ pub fn symbol(text: &str, after_symbol: bool) -> Option<String> {
             "brackets and points have no subscript; turns have one: `+_l`".to_owned()
         }
         '_' => format!("the width of lines is written `!{}`", arguments().replace("(n)", "(w)")),
-        ',' if after_symbol || rest.starts_with('(') => {
+        ',' if rest.starts_with('(') => {
             format!("a colour is chosen by its number or its name: `;{}`, `;(rose)`", arguments())
         }
+        // A decimal comma, as in a weight.
+        ',' if before.ends_with(is_digit) && rest.starts_with(is_digit) => return None,
+        ',' => match comma(before, rest) {
+            Comma::Separator => NO_COMMAS.to_owned(),
+            Comma::Color => format!("{COLOR_BEFORE}; `;` alone is the next one"),
+            Comma::Either => format!("{NO_COMMAS}; or, if this is cpfg's sign, {COLOR_BEFORE}"),
+        },
         '\'' => "the next colour is written `;` in place of `'`; begin with a colour by its number or its name, `;(n)` or `;(bark)`"
             .to_owned(),
         '₀'..='₉' if after_symbol => "the subscript of a symbol begins with `_`: `+_1`".to_owned(),
         _ => return None,
     })
+}
+
+/// The hint for a name with a subscript of its own, such as `F₁`: the part before `_` would say how it is drawn.
+pub fn subscript(name: &str) -> Option<String> {
+    let at = name.find(|c| ('₀'..='₉').contains(&c)).filter(|at| *at > 0)?;
+    let digits: Option<String> =
+        name[at..].chars().map(|c| char::from_digit(u32::from(c).checked_sub(u32::from('₀'))?, 10)).collect();
+    digits.map(|digits| format!("a subscript is written behind `_`: `{}_{digits}`", &name[..at]))
+}
+
+/// The hint where a comma separates modules.
+pub const NO_COMMAS: &str = "modules stand one after another, with spaces and no commas";
+/// The hint where a comma is cpfg's sign.
+const COLOR_BEFORE: &str =
+    "the colour before the present one is chosen by its number or its name: `;(n)`, `;(rose)`";
+
+/// What a comma in a string is meant for.
+enum Comma {
+    /// It stands between two modules.
+    Separator,
+    /// It is the sign of cpfg and L-Py for the colour before the present one.
+    Color,
+    Either,
+}
+
+/// The meaning of a comma by the text before it and behind it. Where a string begins, behind a symbol and with a space only before it,
+/// it separates nothing.
+fn comma(before: &str, behind: &str) -> Comma {
+    let written = before.trim_end();
+    let is_first = written.ends_with("produce")
+        || !written.ends_with(|c: char| c.is_alphanumeric() || c == ')' || c == ']');
+    match (written.len() < before.len(), behind.starts_with(|c: char| !c.is_whitespace())) {
+        _ if is_first => Comma::Color,
+        (true, true) => Comma::Color,
+        (false, false) => Comma::Separator,
+        _ => Comma::Either,
+    }
 }
 
 /// The counterpart of a module that cpfg, lpfg or L-Py draw by its name.
@@ -342,11 +387,43 @@ mod tests {
 
     #[test]
     fn symbols_are_translated_with_their_arguments() {
-        assert!(symbol("~L(2) F", false).is_some_and(|help| help.contains("`@L(2)`; that one is built in")));
-        assert!(symbol("~leaf", false).is_some_and(|help| help.contains("surface @leaf from \"leaf.s\"")));
-        assert!(symbol("_(0.5)F", false).is_some_and(|help| help.contains("`!(0.5)`")));
-        assert!(symbol(",(3)", false).is_some_and(|help| help.contains("`;(3)`")));
-        assert!(symbol(", B", false).is_none() && symbol("F", false).is_none());
+        assert!(symbol("", "~L(2) F").is_some_and(|help| help.contains("`@L(2)`; that one is built in")));
+        assert!(symbol("", "~leaf").is_some_and(|help| help.contains("surface @leaf from \"leaf.s\"")));
+        assert!(symbol("", "_(0.5)F").is_some_and(|help| help.contains("`!(0.5)`")));
+        assert!(symbol("F ", ",(3)").is_some_and(|help| help.contains("`;(3)`")));
+        assert!(symbol("F ", "F").is_none());
+    }
+
+    #[test]
+    fn subscripts_are_written_behind_a_line() {
+        assert!(subscript("F₁₂").is_some_and(|help| help.contains("`F_12`")));
+        assert!(subscript("F").is_none() && subscript("₁").is_none() && subscript("F₁x").is_none());
+    }
+
+    #[test]
+    fn commas_are_told_by_what_stands_around_them() {
+        let said = |before: &str, text: &str| {
+            let help = symbol(before, text).expect("a hint");
+            (help.contains("no commas"), help.contains("`;(n)`"))
+        };
+        for (before, text) in [
+            ("A -> ", ",F"),
+            ("A -> ", ", F"),
+            ("axiom:", ",F"),
+            ("A: if x = 1 produce ", ", F"),
+            ("A -> F [", ",F ]"),
+            ("A -> F ;", ", F"),
+            ("A -> F ", ",F"),
+            ("A -> F(1) ", ",F"),
+        ] {
+            assert_eq!(said(before, text), (false, true), "{before}{text}");
+        }
+        assert_eq!(said("A -> F(1)", ", F(2)"), (true, false));
+        assert!(symbol("A -> 0", ",3: F").is_none());
+        assert_eq!(said("A -> [ F ]", ", F(2)"), (true, false));
+        for (before, text) in [("A -> F ", ", F"), ("A -> F", ",F"), ("A -> F(1)", ",F(2)")] {
+            assert_eq!(said(before, text), (true, true), "{before}{text}");
+        }
     }
 
     #[test]

@@ -23,6 +23,8 @@ pub struct ModuleString {
     /// Birth and lineage of modules that belong to no group of a tree.
     ungrouped: Vec<(SimTime, Lineage)>,
     version: Option<Version>,
+    /// The limit of modules of the run that has written the string.
+    run_limit: usize,
 }
 
 /// Which modules a string is made of: the same number means the same ones, in the same order.
@@ -59,6 +61,9 @@ pub struct Module<'a> {
 }
 
 impl ModuleString {
+    /// Modules that a drawing may have in any case: a low limit of a run is meant for growth, and a module may draw many.
+    pub const DRAWN: usize = 10_000_000;
+
     /// Empties the string and sets its time, keeping its memory.
     pub fn reset(&mut self, time: f64) {
         (self.time, self.now, self.version) = (time, SimTime::ZERO, None);
@@ -128,6 +133,17 @@ impl ModuleString {
             string.parameters.iter().map(|value| value.to_bits())
         }
         self.version.is_some() && self.version == other.version && bits(self).eq(bits(other))
+    }
+
+    /// Most modules that a drawing of this string may have, those that interpretations make included: the limit of the run that has
+    /// written it, if that is greater than [`DRAWN`](ModuleString::DRAWN).
+    pub fn drawn_limit(&self) -> usize {
+        self.run_limit.max(ModuleString::DRAWN)
+    }
+
+    /// Sets the limit of modules of the run that the string is of.
+    pub fn set_run_limit(&mut self, limit: usize) {
+        self.run_limit = limit;
     }
 
     /// Sets the version; changes of the string unset it.

@@ -73,12 +73,13 @@ fn verify(args: &ReportArgs, session: &Session) -> Result<bool, Failure> {
 fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure> {
     let plan = Plan {
         methods: args.methods.clone().unwrap_or_else(|| Method::NAMED.iter().map(|(_, m)| *m).collect()),
-        tolerances: args.tolerances.clone().unwrap_or_else(Plan::default_tolerances),
+        tolerances: args.tolerances.clone(),
         step_sizes: args.step_sizes.clone(),
         slices: args.slices.clone(),
         times: times(args, session)?,
         runs: args.runs,
         time_limit: args.time_limit,
+        budget: args.study_budget,
         base: args.budget.settings(),
     };
     let progress = RefCell::new(Progress::of_printed(name, plan.points(session)));
@@ -109,6 +110,7 @@ fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure
             session.source.name
         ))
     })?;
+    print(&left_out(&study, args))?;
     stems(args, session, name, &plan)?;
     passive(args, session, name, &plan)?;
     soils(args, session, name, &plan)?;
@@ -117,6 +119,16 @@ fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure
     write(out, &format!("{name}.csv"), &study::csv(&study))?;
     write(out, &format!("{name}.json"), &study::json(&study))?;
     write(out, &format!("{name}.svg"), &study::svg(&study))
+}
+
+/// How many points did not fit into the time, and which time has room for them.
+fn left_out(study: &study::Study, args: &ReportArgs) -> String {
+    let Some((count, enough)) = study.left_out(args.time_limit) else { return String::new() };
+    // Rounded up to a digit.
+    let unit = 10f64.powf(enough.max(1.0).log10().floor());
+    let (count, budget) = (count_of(count, "point"), args.study_budget);
+    let enough = ((enough / unit).ceil() * unit).max(2.0 * budget);
+    format!("\n{count} left out to stay within {budget} s; `--budget {enough}` has time for all\n")
 }
 
 /// Studies the methods of bending on a model with tissues.

@@ -3,7 +3,7 @@
 //! A module of the string is drawn by its own name, or as an `interpret` says. The text to look at is in the one case
 //! the production that makes such modules (or the initial string), in the other the line of the `interpret`.
 
-use super::{COORDINATE_LIMIT, DEPTH_LIMIT, MODULE_LIMIT};
+use super::{COORDINATE_LIMIT, DEPTH_LIMIT};
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{KindId, Model, Produce, Successor};
 use dlsys_tree::Lineage;
@@ -24,9 +24,14 @@ pub enum ErrorKind {
     /// It leads beyond [`COORDINATE_LIMIT`].
     #[error("it goes beyond the greatest coordinate, {COORDINATE_LIMIT:e}")]
     TooFar,
-    /// With its interpretation the frame has more than [`MODULE_LIMIT`] modules.
-    #[error("its interpretation brings the frame to more than {MODULE_LIMIT} modules")]
-    TooMany,
+    /// With its interpretation the frame has more than this many modules; see [`ModuleString::drawn_limit`](dlsys_tree::ModuleString::drawn_limit).
+    #[error("its interpretation brings the frame to more than {limit} modules")]
+    TooMany {
+        /// The limit.
+        limit: usize,
+        /// Modules of the string itself.
+        in_string: usize,
+    },
     /// Interpretations are nested deeper than [`DEPTH_LIMIT`].
     #[error("interpretations are nested more than {DEPTH_LIMIT} deep")]
     TooDeep,
@@ -92,7 +97,10 @@ impl ErrorKind {
                     .to_owned()
             }
             ErrorKind::TooFar => "look for a length or a size that grows without bound".to_owned(),
-            ErrorKind::TooMany => "draw fewer modules for one, or let the rules make fewer".to_owned(),
+            ErrorKind::TooMany { limit, .. } => format!(
+                "if this is meant, allow more: `--max-modules {}`; otherwise draw fewer modules for one, or let the rules make fewer",
+                limit.saturating_mul(10)
+            ),
             ErrorKind::TooDeep => {
                 "let the drawing of a module name what is drawn, not another module with a drawing of its own"
                     .to_owned()
@@ -159,6 +167,12 @@ impl Error {
         let error = match self.kind {
             ErrorKind::BadSurroundings { .. } => error,
             _ => error.note(format!("it is drawn for module {}", self.lineage)),
+        };
+        let error = match self.kind {
+            ErrorKind::TooMany { in_string, .. } => error.note(format!(
+                "{in_string} of them are modules of the string itself; interpretations make the others"
+            )),
+            _ => error,
         };
         error.help(self.kind.help())
     }
@@ -290,7 +304,7 @@ fn warning(remark: Remark, model: &Model, span: Option<Span>, time: f64) -> Diag
         Remark::FewVertices(count) => (
             "a polygon has fewer than three vertices, and is not drawn".to_owned(),
             format!("{count} at t = {time}"),
-            "between `{` and `}` each step `f`, `F` and each `.` makes a vertex: write three or more".to_owned(),
+            "between `{` and `}` each step `f`, `F` and each `.` makes a vertex, and the place of `{` is none: write three or more; `{.` makes one where it begins".to_owned(),
         ),
         Remark::PolygonNotOpen => (
             "a `}` ends no polygon".to_owned(),

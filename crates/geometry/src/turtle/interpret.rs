@@ -10,7 +10,7 @@ use super::prepare::prepare;
 use super::skeleton::Skeleton;
 use super::surroundings::surroundings;
 use super::walk::{DrawnModule, Walk};
-use super::{DEPTH_LIMIT, Error, ErrorKind, MODULE_LIMIT, Pose, Strains};
+use super::{DEPTH_LIMIT, Error, ErrorKind, Pose, Strains};
 use crate::scene::Scene;
 use dlsys_expr::Scratch;
 use dlsys_model::{BadBounds, KindId, Model, Stretch};
@@ -141,8 +141,10 @@ struct Expander<'a> {
     model: &'a Model,
     commands: &'a [Command],
     time: f64,
-    /// Modules of the frame so far, those of the string included.
+    /// Modules of the frame so far, those of the string included; how many the string has, and how many there may be.
     drawn: usize,
+    in_string: usize,
+    limit: usize,
     levels: Vec<Level>,
     kinds: Vec<KindId>,
     arguments: Vec<f64>,
@@ -157,6 +159,8 @@ impl<'a> Expander<'a> {
             commands,
             time: string.time,
             drawn: string.len(),
+            in_string: string.len(),
+            limit: string.drawn_limit(),
             levels: Vec::new(),
             kinds: Vec::new(),
             arguments: Vec::new(),
@@ -187,8 +191,8 @@ impl<'a> Expander<'a> {
             let from = level.next;
             level.next += arity;
             self.drawn += 1;
-            if self.drawn > MODULE_LIMIT {
-                return Err(walk.error(ErrorKind::TooMany));
+            if self.drawn > self.limit {
+                return Err(self.too_many(walk));
             }
             match self.commands[kind.index()] {
                 Command::Interpret(index) if !self.levels.iter().any(|level| level.index == index) => {
@@ -211,13 +215,18 @@ impl<'a> Expander<'a> {
         Ok(())
     }
 
+    fn too_many(&self, walk: &Walk<'_>) -> Error {
+        walk.error(ErrorKind::TooMany { limit: self.limit, in_string: self.in_string })
+    }
+
     /// Begins an interpretation; `variables` holds the parameters of the module that it stands for.
     fn enter(&mut self, index: usize, age: f64, walk: &mut Walk<'_>) -> Result<(), Error> {
         let (first, first_kind) = (self.arguments.len(), self.kinds.len());
         let (kinds, arguments, drawn) = (&mut self.kinds, &mut self.arguments, self.drawn);
+        let limit = self.limit;
         self.variables.extend([self.time, age]);
         let mut add = |stretch: &Stretch, variables: &mut Vec<f64>, scratch: &mut Scratch<f64>| {
-            if drawn + kinds.len() + stretch.kinds.len() > MODULE_LIMIT {
+            if drawn + kinds.len() + stretch.kinds.len() > limit {
                 return Err(Unexpanded::TooMany);
             }
             kinds.extend_from_slice(&stretch.kinds);
@@ -231,7 +240,7 @@ impl<'a> Expander<'a> {
                 self.levels.push(Level { index, first_kind, next_kind, end, first, next: first });
                 Ok(())
             }
-            Err(Unexpanded::TooMany) => Err(walk.error(ErrorKind::TooMany)),
+            Err(Unexpanded::TooMany) => Err(self.too_many(walk)),
             Err(Unexpanded::Bounds(BadBounds { span, why })) => {
                 Err(Error { span: Some(span), ..walk.error(ErrorKind::BadBounds { why }) })
             }

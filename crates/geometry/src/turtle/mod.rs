@@ -86,8 +86,6 @@ pub use free::{FreePart, Passive, SolidBody};
 pub use skeleton::{Form, Load, Origin, Piece, Skeleton, Stem};
 pub use surroundings::surroundings;
 
-/// Most modules that one frame may draw, those that interpretations make included.
-pub const MODULE_LIMIT: usize = 10_000_000;
 /// Deepest nesting of interpretations.
 pub const DEPTH_LIMIT: usize = 100;
 /// Coordinates and sizes beyond this are a mistake of the model.

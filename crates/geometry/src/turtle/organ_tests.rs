@@ -180,13 +180,27 @@ fn warnings(modules: &[(&str, &[f64])]) -> Vec<String> {
 fn a_step_of_the_width_is_reported_where_nothing_hides_it() {
     let step: [(&str, &[f64]); 4] = [("!", &[0.4]), ("F", &[1.0]), ("!", &[0.2]), ("F", &[1.0])];
     assert_eq!(warnings(&step), ["the width of a stem changes at once"]);
-    let silent: [&[(&str, &[f64])]; 6] = [
+    // A branch does not hide so large a step, of whatever it is.
+    for drawn in ["F", "@L"] {
+        let behind: [(&str, &[f64]); 7] = [
+            ("!", &[0.4]),
+            ("F", &[1.0]),
+            ("[", &[]),
+            (drawn, &[]),
+            ("]", &[]),
+            ("!", &[0.28]),
+            ("F", &[1.0]),
+        ];
+        assert_eq!(warnings(&behind), ["the width of a stem changes at once"], "{drawn}");
+    }
+    let silent: [&[(&str, &[f64])]; 7] = [
         // Too little, or too small to be seen.
         &[("!", &[0.4]), ("F", &[1.0]), ("!", &[0.36]), ("F", &[1.0])],
         &[("!", &[0.004]), ("F", &[1.0]), ("!", &[0.002]), ("F", &[1.0])],
         // It tapers; a branch or an organ stands there; it is another organ; it begins anew.
         &[("!", &[0.4]), ("F", &[1.0]), ("@W", &[0.2]), ("F", &[1.0])],
-        &[("!", &[0.4]), ("F", &[1.0]), ("[", &[]), ("@L", &[]), ("]", &[]), ("!", &[0.2]), ("F", &[1.0])],
+        &[("!", &[0.4]), ("F", &[1.0]), ("[", &[]), ("@L", &[]), ("]", &[]), ("!", &[0.32]), ("F", &[1.0])],
+        &[("!", &[0.4]), ("F", &[1.0]), ("@O", &[0.5]), ("!", &[0.2]), ("F", &[1.0])],
         &[("!", &[0.4]), ("F", &[1.0]), (";", &[3.0]), ("!", &[0.2]), ("F", &[1.0])],
         &[("!", &[0.4]), ("F", &[1.0]), ("f", &[1.0]), ("!", &[0.2]), ("F", &[1.0])],
     ];

@@ -157,11 +157,17 @@ fn interpretations_that_explode_are_stopped() {
         let (name, next) = (format!("A{level}"), format!("A{}", level + 1));
         interpret(&mut model, &name, &[(&next, 1), (&next, 1)], |_, [x, _, _]| vec![x, x]);
     }
-    let wide = string(&mut model, &[("A0", &[1.0])]);
+    let mut wide = string(&mut model, &[("A0", &[1.0])]);
     assert!(matches!(
         draw(&model, &wide, &mut Scene::default()),
-        Err(Error { kind: ErrorKind::TooMany, .. })
+        Err(Error { kind: ErrorKind::TooMany { limit: ModuleString::DRAWN, in_string: 1 }, .. })
     ));
+    for (of_run, limit) in [(100, ModuleString::DRAWN), (12_000_000, 12_000_000)] {
+        wide.set_run_limit(of_run);
+        let error = draw(&model, &wide, &mut Scene::default()).expect_err("too many");
+        assert_eq!(error.kind, ErrorKind::TooMany { limit, in_string: 1 });
+        assert!(error.diagnostic().help.concat().contains(&format!("`--max-modules {}`", 10 * limit)));
+    }
     let mut model = Model::default();
     for level in 0..101 {
         let (name, next) = (format!("A{level}"), format!("A{}", level + 1));

@@ -52,8 +52,8 @@ struct State {
     run: usize,
     /// The interpretation and the module that set the width with `!`.
     set_by: Option<(Option<(usize, KindId)>, DrawnModule)>,
-    /// A branch or an organ stands where the turtle is.
-    node: bool,
+    /// What stands where the turtle is.
+    node: Node,
     /// The tissue of stems that give way, by its number from 0; `None` for rigid ones.
     tissue: Option<usize>,
     /// The tissue of what is rigid: the last one that gave way.
@@ -66,6 +66,17 @@ struct State {
     part: Option<usize>,
     /// The number of the stem that a step here continues.
     joined: Option<u32>,
+}
+
+/// What stands at a place of an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+enum Node {
+    #[default]
+    Bare,
+    /// A branch, of stems or of organs.
+    Branch,
+    /// An organ on the axis itself.
+    Organ,
 }
 
 /// A polygon that is open.
@@ -135,7 +146,7 @@ impl<'a> Walk<'a> {
                 parent: None,
                 run: 0,
                 set_by: None,
-                node: false,
+                node: Node::Bare,
                 tissue: None,
                 rigid: None,
                 bent: None,
@@ -318,7 +329,9 @@ impl<'a> Walk<'a> {
                 // Brackets match, by the rules of the language; a stray one changes nothing.
                 if let Some(state) = self.stack.pop() {
                     self.state = state;
-                    self.state.node = true;
+                    if self.state.node == Node::Bare {
+                        self.state.node = Node::Branch;
+                    }
                 }
             }
             Command::BeginPolygon => {

@@ -34,6 +34,7 @@ impl Simulation<'_> {
             self.rebuild(&mut cache, t, now, out);
             cache.version = Some(version);
             out.set_version(version);
+            out.set_run_limit(self.setup.settings.max_modules);
         }
         // The first place of a value that is none.
         let mut bad = usize::MAX;

@@ -3,7 +3,7 @@
 use super::advice;
 use super::expected::is_item_with_name;
 use crate::declarations;
-use crate::foreign_syntax;
+use crate::foreign_syntax::{self, NO_COMMAS};
 use crate::grammar::Rule;
 use crate::suggest::nearest;
 
@@ -92,7 +92,6 @@ fn hint_of_group(item: Rule, before: &str, found: &str) -> Option<&'static str> 
 /// Hints for symbols of strings in cpfg and L-Py.
 fn hint_of_symbol(item: Rule, before: &str, rest: &str) -> Option<String> {
     let in_step = item == Rule::step_item && (before.contains("->") || before.contains('→'));
-    let after_symbol = before.ends_with(|c: char| !(c.is_alphanumeric() || c == ')' || c.is_whitespace()));
     if !in_step && !in_string(item, before) {
         return None;
     }
@@ -100,7 +99,7 @@ fn hint_of_symbol(item: Rule, before: &str, rest: &str) -> Option<String> {
     let is_number = number.starts_with(|c: char| c.is_ascii_digit());
     match before.chars().next_back().filter(|c| is_number && "+-&^\\/|!;".contains(*c)) {
         Some(symbol) => Some(format!("a parameter stands in parentheses: `{symbol}({number})`")),
-        None => foreign_syntax::symbol(rest, after_symbol),
+        None => foreign_syntax::symbol(before, rest),
     }
 }
 
@@ -280,7 +279,6 @@ fn hint_of_remainder(before: &str, behind: &str) -> String {
 }
 
 const DECIMAL: &str = "the decimal sign is a point: `0.5`";
-const NO_COMMAS: &str = "modules stand one after another, with spaces and no commas";
 const POINT: &str = "a number begins with a digit: `0.5`";
 const ROUND: &str = "parameters stand in round parentheses: `A(x)`";
 const ARROW: &str = "in a clause a production is written `if x = 2 produce …`; a discrete rule has its arrow behind the head: `A(x) : x > 3 -> …`";

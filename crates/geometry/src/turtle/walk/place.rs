@@ -6,7 +6,7 @@ use super::super::error::{ErrorKind, Remark};
 use super::super::free::FreePart;
 use super::super::skeleton::Origin;
 use super::super::{Error, Pose};
-use super::{DrawnModule, Outline, Walk};
+use super::{DrawnModule, Node, Outline, Walk};
 use crate::scene::{
     GasSource, MaterialId, Patch, Placement, Point, Polygon, Seedling, Shape, SheetKey, SheetPlace,
     SourceKey, Surface, Vector,
@@ -85,7 +85,7 @@ impl Walk<'_> {
             [width, length] => [width, length, length],
             [width, length, height, ..] => [width, length, height],
         };
-        self.state.node = true;
+        self.state.node = Node::Organ;
         // The axes are heading, left, up.
         let scales = [self.in_range(length)?, self.in_range(width)?, self.in_range(height)?];
         if scales.iter().all(|scale| *scale > 0.0) {

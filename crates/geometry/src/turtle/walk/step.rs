@@ -165,12 +165,12 @@ impl Walk<'_> {
         }
         let end = self.seen(self.state.position);
         let (follows, grows_from) = (self.state.last.take(), self.state.parent.take());
-        let node = std::mem::replace(&mut self.state.node, false);
+        let node = std::mem::take(&mut self.state.node);
         if draw && self.polygons.is_empty() {
             self.check_body();
             let material = self.chosen().unwrap_or(MaterialId::STEM);
-            if let Some(before) = follows.filter(|_| !node) {
-                self.check_step(before, material);
+            if let Some(before) = follows {
+                self.check_step(before, material, node);
             }
             let segment = Segment {
                 start,

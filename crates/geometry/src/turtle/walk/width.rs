@@ -1,7 +1,7 @@
 //! Widths along an axis: stems that taper, and steps that can be seen.
 
 use super::super::error::{self, Remark};
-use super::{Scene, Walk};
+use super::{Node, Scene, Walk};
 use crate::scene::{MaterialId, Width};
 use dlsys_model::KindId;
 
@@ -44,17 +44,23 @@ impl Walk<'_> {
         }
     }
 
-    /// Warns if the segment that begins here continues one of another width, at a place where nothing else is drawn, and if
-    /// that can be seen.
-    pub(super) fn check_step(&mut self, before: usize, material: MaterialId) {
+    /// Warns if the segment that begins here continues one of another width, and if that can be seen. Behind a branch
+    /// a stem may be a little narrower, as plants are, and an organ on the axis hides the step.
+    pub(super) fn check_step(&mut self, before: usize, material: MaterialId, node: Node) {
         /// Ratio of widths, and step in units of the accuracy (two pixels of a thousand), from which a step is noticed.
         const RATIO: f64 = 1.15;
+        const RATIO_AT_BRANCH: f64 = 1.3;
         const VISIBLE: f64 = 4.0;
         let segment = &self.scene.segments[before];
         let (Width::Set(from), Width::Set(to)) = (segment.widths[1], self.state.width) else { return };
         let (thin, thick) = (from.min(to), from.max(to));
         let accuracy = self.scene.accuracy;
-        let is_step = thin > 0.0 && thick > RATIO * thin && segment.material == material;
+        let ratio = match node {
+            Node::Bare => RATIO,
+            Node::Branch => RATIO_AT_BRANCH,
+            Node::Organ => return,
+        };
+        let is_step = thin > 0.0 && thick > ratio * thin && segment.material == material;
         let seen = is_step && accuracy > 0.0 && thick - thin > VISIBLE * accuracy;
         self.scene.lacked_accuracy |= is_step && accuracy <= 0.0 && self.state.set_by.is_some();
         // A drawing that sets the width more than once is a shape with steps.
