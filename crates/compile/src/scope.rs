@@ -388,6 +388,7 @@ impl Scope {
             names.insert(parameter.text.clone(), node);
         }
         let inner = Variables { names, ..Variables::default() };
+        let said = self.diagnostics.len();
         // The term is evaluated repeatedly, so it cannot contain numbers that are drawn once.
         let may_draw = std::mem::take(&mut self.draws.allowed);
         let term = match aggregate.term {
@@ -395,6 +396,12 @@ impl Scope {
             None => Some(self.graph.constant(1.0)),
         };
         self.draws.allowed = may_draw;
+        // A parameter that the head does not name.
+        let said = self.diagnostics.get_mut(said).filter(|said| said.message.starts_with("unknown name"));
+        if let (Some(said), true) = (said, aggregate.head.parameters.is_empty()) {
+            let (fold, name) = (aggregate.fold.name(), &aggregate.head.name.text);
+            said.help = vec![format!("parameters have their names in the aggregate: `{fold}({name}(x): x)`")];
+        }
         let term = term?;
         let same = |known: &Gathered| {
             let names = known.head.name.text == aggregate.head.name.text

@@ -77,6 +77,7 @@ const STEPS: &str = "there are no derivation steps; write the times to look at: 
 const RULES: &str = "remove this line: rules stand among declarations, `A(x): if x = 1 produce F(x) A(0)`, or discrete `A(x) : x > 3 -> F(x) A(0)`";
 const PRODUCE: &str = "a clause has one successor, and strings are not put together by statements: `if x = 1 produce F(x) A(0)`; modules that repeat are productions of their own";
 const STATEMENTS: &str = "a model is no program: what is to change in time is a parameter with an equation, `A(x): solve dx/dt = 1`";
+const AXIOM: &str = "the string at t = 0 is written `initial string: A(0)` or `axiom: A(0)`";
 const DRAWINGS: &str = "remove this line, and write `interpret` before each of the rules below it, with `:` in place of the arrow (and without `: *`): `A(x) --> F(x)` becomes `interpret A(x): F(x)`; otherwise they are productions";
 const PARTS: &str = "remove this line: what falls into parts at once has a rule, `A(x): produce F(x) B(x)`";
 
@@ -93,6 +94,12 @@ pub fn line(line: &str, at: usize) -> Option<Diagnostic> {
     })?;
     let of_words = known.iter().filter(|word| **word != ":").count();
     let end = words[of_words - 1].1;
+    // Statements assign; otherwise, what follows is a string.
+    let behind = line[end..].trim_matches([' ', ':']);
+    let help = match known {
+        ["start", ":"] if !behind.is_empty() && !behind.contains(['=', '{']) => AXIOM,
+        _ => help,
+    };
     let number = line.rsplit(':').next().unwrap_or_default().trim().parse::<u32>();
     let help = match number {
         Ok(n) => ["0 .. ", "--at ", "--seed "].iter().fold((*help).to_owned(), |help, before| {

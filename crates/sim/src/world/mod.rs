@@ -337,7 +337,7 @@ pub fn site_of_axiom(time: f64) -> Site {
     }
 }
 
-/// A module as it is written, numbers to six digits: for people.
+/// A module as it is written, numbers to six digits, whole ones to all that they have: for people.
 pub fn describe(model: &Model, kind: KindId, parameters: &[f64]) -> String {
     let (name, arity) = (&model.kinds.get(kind).name, model.kinds.get(kind).arity);
     // Hidden parameters are no part of how it is written.
@@ -345,7 +345,10 @@ pub fn describe(model: &Model, kind: KindId, parameters: &[f64]) -> String {
     if parameters.is_empty() {
         return name.clone();
     }
-    let shown: Vec<String> = parameters.iter().map(|x| brief(*x, 6)).collect();
+    // A count that looks exact is.
+    let is_whole = |x: f64| x != 0.0 && x.fract() == 0.0 && x.abs() < 1e15;
+    let shown: Vec<String> =
+        parameters.iter().map(|x| if is_whole(*x) { x.to_string() } else { brief(*x, 6) }).collect();
     format!("{name}({})", shown.join(", "))
 }
 

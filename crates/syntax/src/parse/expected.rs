@@ -185,6 +185,9 @@ pub fn unknown_line(text: &str, item: &RawItem) -> Diagnostic {
     if matches!(first, "if" | "solve" | "produce") {
         return diagnostic.help("a clause stands under the head of its rule, such as `F(x):`");
     }
+    if matches!(first, "when" | "once") {
+        return diagnostic.help("a condition begins with `if`: `if x = 1 produce F(x)`");
+    }
     // A word that begins a declaration where its value follows.
     if let Some(declaration) = Declaration::of_word(first) {
         return Diagnostic::error(format!("`{first}` is not complete"))

@@ -132,7 +132,12 @@ fn hint_of_chance(item: Rule, text: &str, at: usize, found: &str) -> Option<&'st
         "produce" | "solve" if last == "rate" => {
             Some("behind `at rate` stands the rate: `at rate 0.5 produce …`")
         }
-        "solve" if before.rsplit('\n').next().is_some_and(|line| line.contains("at rate")) => {
+        "solve" | "" | "\n"
+            if before
+                .rsplit('\n')
+                .next()
+                .is_some_and(|line| line.contains("at rate") && !line.contains("produce")) =>
+        {
             Some("what happens at a rate is a production: `at rate 0.5 produce …`")
         }
         _ if last == "rate" && words.len() > 1 && words[words.len() - 2] != "at" => Some(
@@ -149,6 +154,14 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
     let touching = before.len() == at;
     let in_rule = item == Rule::rule_item;
     let advice = match (previous, found) {
+        (_, ":") if in_rule && text[at..].starts_with(":=") => EQUATION,
+        (Some('d'), "(") if in_rule && last_keyword(before) == Some("solve") => EQUATION,
+        (Some('/'), word) if in_rule && word.starts_with('d') && last_keyword(before) == Some("solve") => {
+            "rates are by time: `dx/dt = …`"
+        }
+        (_, "|") if in_rule && previous.is_some_and(|c| "+-*/(=<,".contains(c)) => {
+            "an absolute value is written `abs(x)`"
+        }
         (Some('='), "=") if touching => "equality is written with one `=`",
         (Some('='), "<" | ">") if touching => "“at most” is written `<=`, “at least” `>=`",
         (Some('<'), ">") if touching => "“not equal” is written `!=`",
@@ -200,7 +213,9 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (_, "-") if is_item_with_name(item) && !before.contains('=') => {
             "a name is made of letters, digits and `_`"
         }
-        (_, "-" | "=") if item == Rule::frames_item => "frames are written `frames 0 .. 10 step 0.1`",
+        (_, "-" | "=" | ",") if item == Rule::frames_item && !text[at..].contains("..") => {
+            "frames are written `frames 0 .. 10 step 0.1`"
+        }
         (_, "=") if item == Rule::angle_item => "the angle is written `angle 45`",
         (_, "step") if item == Rule::param_item => {
             "a `param` has a range and no step: any value in it can be chosen: `param r = 1 in 0 .. 10`"
@@ -254,9 +269,7 @@ fn hint_by_symbol(item: Rule, text: &str, at: usize, found: &str) -> Option<Stri
         (Some(')'), ":") if in_rule && !before.contains(':') => {
             "a rule has one predecessor; modules around it are its context: `A(x) < B(y) > C(z):`"
         }
-        (_, "=") if in_rule && before.ends_with(|c: char| c.is_alphanumeric()) => {
-            "an equation is written `dx/dt = …`"
-        }
+        (_, "=") if in_rule && before.ends_with(|c: char| c.is_alphanumeric()) => EQUATION,
         (_, ":") if in_rule && last_keyword(before) == Some("if") => {
             "a condition has no `:` behind it: `if x < 1 solve …`"
         }
@@ -278,6 +291,7 @@ fn hint_of_remainder(before: &str, behind: &str) -> String {
     }
 }
 
+const EQUATION: &str = "an equation is written `dx/dt = …`";
 const DECIMAL: &str = "the decimal sign is a point: `0.5`";
 const POINT: &str = "a number begins with a digit: `0.5`";
 const ROUND: &str = "parameters stand in round parentheses: `A(x)`";
