@@ -21,7 +21,7 @@ impl<'w, W: Write> Apng<'w, W> {
         // No end of repetitions.
         encoder.set_animated(u32::try_from(frames).map_err(io::Error::other)?, 0)?;
         encoder.set_blend_op(png::BlendOp::Source)?;
-        Ok(Apng { writer: encoder.write_header()?, is_layered, ticks: Ticks::new(1000.0, [1, 65_535]) })
+        Ok(Apng { writer: encoder.write_header()?, is_layered, ticks: Ticks::APNG })
     }
 }
 

@@ -27,7 +27,7 @@ impl<'w, W: Write> Gif<'w, W> {
         encoder.set_repeat(gif::Repeat::Infinite).map_err(failed)?;
         let shown = vec![[0; 3]; shape.width as usize * shape.height as usize];
         // Browsers slow down frames of less than two hundredths of a second.
-        Ok(Gif { encoder, ticks: Ticks::new(100.0, [2, 65_535]), shown })
+        Ok(Gif { encoder, ticks: Ticks::GIF, shown })
     }
 }
 

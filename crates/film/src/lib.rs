@@ -102,6 +102,29 @@ impl Format {
         matches!(self, Format::Webp | Format::Apng)
     }
 
+    /// The clock of the format; `None` if frames last as long as they are asked to.
+    fn ticks(self) -> Option<Ticks> {
+        match self {
+            Format::Webp => Some(Ticks::WEBP),
+            Format::Apng => Some(Ticks::APNG),
+            Format::Gif => Some(Ticks::GIF),
+            _ => None,
+        }
+    }
+
+    /// How long a film takes to play whose frames are to end at these ascending times, all in seconds: longer where frames would be shorter than the format has them.
+    pub fn played(self, ends: &[f64]) -> f64 {
+        match self.ticks() {
+            Some(mut ticks) => {
+                ends.iter().for_each(|end| {
+                    ticks.up_to(*end);
+                });
+                ticks.sum / ticks.per_second
+            }
+            None => ends.last().copied().unwrap_or(0.0),
+        }
+    }
+
     /// Whether a file that begins like this is of the format.
     pub fn begins(self, start: &[u8]) -> bool {
         match self {
@@ -225,6 +248,18 @@ impl<'w> Film<'w> {
                 format.extension()
             )));
         }
+        if let Some(ticks) = format.ticks() {
+            let begins = std::iter::once(&0.0).chain(&ends);
+            let longest = begins.zip(&ends).map(|(begin, end)| end - begin).fold(0.0, f64::max);
+            let most = f64::from(ticks.limits[1]) / ticks.per_second;
+            if longest > most {
+                return Err(invalid(format!(
+                    "a frame would last {} s, and those of {} files last {most} s at most; a larger `--speed` or a smaller `--step` makes frames shorter",
+                    (longest * 1e3).round() / 1e3,
+                    format.extension()
+                )));
+            }
+        }
         let encoder: Box<dyn Encoder + 'w> = match format {
             Format::Webp => Box::new(webp::Webp::new(out, shape, threads)?),
             Format::Apng => Box::new(apng::Apng::new(out, shape, ends.len())?),
@@ -285,7 +320,12 @@ struct Ticks {
 }
 
 impl Ticks {
-    fn new(per_second: f64, limits: [u32; 2]) -> Ticks {
+    const WEBP: Ticks = Ticks::new(1000.0, [1, 0xff_ffff]);
+    const APNG: Ticks = Ticks::new(1000.0, [1, 65_535]);
+    /// Browsers play frames of one tick much more slowly.
+    const GIF: Ticks = Ticks::new(100.0, [2, 65_535]);
+
+    const fn new(per_second: f64, limits: [u32; 2]) -> Ticks {
         Ticks { per_second, limits, sum: 0.0 }
     }
 

@@ -52,7 +52,7 @@ impl<'w, W: Write + Seek> Webp<'w, W> {
         // The size is not known yet.
         out.write_all(b"RIFF\0\0\0\0WEBP")?;
         let flags = HAS_ANIMATION | if shape.has_alpha { HAS_ALPHA } else { 0 };
-        let (ticks, frames) = (Ticks::new(1000.0, [1, 0xff_ffff]), Pipeline::new(threads));
+        let (ticks, frames) = (Ticks::WEBP, Pipeline::new(threads));
         let mut webp = Webp { out, bytes: 4, begun, flags, ticks, frames };
         let mut head = vec![flags, 0, 0, 0];
         head.extend(three(shape.width - 1));

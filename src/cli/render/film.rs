@@ -105,12 +105,20 @@ pub fn render_run(
     let (false, Some(out)) = (args.quiet, out) else { return Ok(()) };
     let [width, height] = writer.page.pixels;
     let ends = pace::ends(args, &run);
+    let (asked, played) = (ends.last().copied().unwrap_or(0.0), format.played(&ends));
+    let slower = match played > 1.05 * asked {
+        true => format!(
+            "  its frames are too short for {}, so it plays more slowly than the {asked:.2} s asked for\n",
+            format.extension()
+        ),
+        false => String::new(),
+    };
     let line = format!(
-        "{}: {} of {width}x{height} pixels, {}{:.2} s to play, {}, in {:.2} s\n{note}{}",
+        "{}: {} of {width}x{height} pixels, {}{:.2} s to play, {}, in {:.2} s\n{note}{slower}{}",
         out.display(),
         count_of(run.times.len(), "frame"),
         pace::rate(&ends).map_or_else(String::new, |rate| format!("{} a second, ", pace::rounded(rate))),
-        ends.last().unwrap_or(&0.0),
+        played,
         size_of(bytes),
         begun.elapsed().as_secs_f64(),
         pace::remark(args, &run, &ends)
