@@ -187,7 +187,7 @@ pub fn label(
         false => at_edges.samples(&SIXTEEN, &face_items, &mut shading),
     };
     let per_cell = if is_fine { EIGHT.len() } else { SIXTEEN.len() };
-    let is_large = shades.iter().map(|shade| shade.item.shades > SHADES).collect();
+    let is_floor = shades.iter().map(|shade| shade.item.shades == FLOOR_SHADES).collect();
     let least =
         shades.iter().map(|shade| (f64::from(shade.step) - 0.5) / f64::from(shade.item.shades)).collect();
     let steps = shades.iter().map(|shade| shade.step).collect();
@@ -205,7 +205,7 @@ pub fn label(
         strengths,
         least,
         means,
-        is_large,
+        is_floor,
     };
     (regions, shades)
 }

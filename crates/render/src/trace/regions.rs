@@ -55,8 +55,8 @@ pub struct Regions {
     pub least: Vec<f64>,
     /// By region: the mean of them.
     pub means: Vec<f64>,
-    /// By region: whether it is so large that its outline is exact where it leaves the edge of its item.
-    pub is_large: Vec<bool>,
+    /// By region: whether it is floor, whose many outlines are exact where they meet what stands on it.
+    pub is_floor: Vec<bool>,
 }
 
 /// Marks on the cells of a raster, so that they need not be taken away: the last piece that a cell was found to be in, or is covered by, or the last hole
@@ -344,7 +344,7 @@ impl Regions {
             }
             passed.clear();
             let mut outline = mask.follow(cell, |cell| passed.push(cell));
-            if self.is_large[label as usize] {
+            if self.is_floor[label as usize] {
                 outline.keep_junctions();
             }
             passed.iter().for_each(|cell| marks.on[*cell] = number + 1);
@@ -395,7 +395,7 @@ pub(super) mod tests {
             least: vec![0.0; 10],
             means: vec![0.0; 10],
             steps: vec![0; 10],
-            is_large: vec![false; 10],
+            is_floor: vec![false; 10],
         }
     }
 
