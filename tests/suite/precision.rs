@@ -248,3 +248,15 @@ proptest! {
         prop_assert!((found[0] - expected[0]).abs() < 1e-4 && (found[1] - expected[1]).abs() < 1e-4, "{:?}, not {:?}\n{}", found, expected, text);
     }
 }
+
+/// What begins from rest at an instant within an age is not known to its own digits at once: the age that its rate reads is a rounded number.
+#[test]
+fn radau_begins_at_a_kink_within_an_age_at_any_tolerance() {
+    let text = "initial string: A(0, 0)\nA(s, o): solve do/dt = slope(cubic_growth, age - 3.05, 0, 1, 3), ds/dt = slope(cubic_growth, age, 0, 0.34, 5)";
+    for tolerance in [1e-8, 1e-10, 1e-12] {
+        let settings = Settings { method: Method::Radau, tolerance, ..Settings::default() };
+        let strings = run(text, settings, &[10.0]).unwrap_or_else(|error| panic!("{tolerance}: {error}"));
+        let [s, o] = strings[0][0].1[..] else { panic!("two parameters") };
+        assert!((s - 0.34).abs() < 1e-9 && (o - 1.0).abs() < 1e-9, "{tolerance}: {s}, {o}");
+    }
+}

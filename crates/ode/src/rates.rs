@@ -35,6 +35,11 @@ pub trait Rates {
         false
     }
 
+    /// True if they depend on time or on an age, which both advance within a step as a float does. Those that are [timed](Rates::is_timed) do.
+    fn reads_clock(&self) -> bool {
+        self.is_timed()
+    }
+
     /// Marks the components that no rate reads, not their own either. What errs in them stays and adds up, so it is tolerated in proportion to
     /// how far they go in a step, not to how far they have come. None by default.
     fn mark_sums(&self, _is_sum: &mut [bool]) {}
@@ -89,6 +94,10 @@ impl<R: Rates> Rates for Shifted<'_, R> {
 
     fn is_timed(&self) -> bool {
         self.system.is_timed()
+    }
+
+    fn reads_clock(&self) -> bool {
+        self.system.reads_clock()
     }
 
     fn mark_sums(&self, is_sum: &mut [bool]) {

@@ -50,6 +50,8 @@ pub struct Workspace {
     pub(crate) noise: Vec<f64>,
     /// The resolution of time at the start of the step if rates depend on time, otherwise 0.
     pub(crate) resolution: f64,
+    /// The same if they depend on time or an age.
+    pub(crate) tick: f64,
     /// Evaluations of the equations of single modules so far.
     pub(crate) evaluations: u64,
     /// The components, in ascending order, that err by more than is tolerated in the step just tried, and are to be integrated again.

@@ -202,6 +202,10 @@ impl Rates for Independent<'_> {
     fn is_timed(&self) -> bool {
         self.program.reads().contains(&self.time)
     }
+
+    fn reads_clock(&self) -> bool {
+        self.is_timed() || self.program.reads().contains(&(self.time + 1))
+    }
 }
 
 /// The first position in a step, from 0 to 1, from which on a pulse may have been overlooked. A rule whose rates cannot

@@ -33,6 +33,8 @@ pub struct Radau {
     partials: Vec<f64>,
     scale: Vec<f64>,
     blur: Vec<f64>,
+    /// How far the resolution of time moves each component in a step; empty if rates do not depend on time.
+    blur_of_time: Vec<f64>,
     coefficients: Vec<f64>,
 }
 
@@ -70,8 +72,6 @@ impl<R: Rates> Stiff for Placed<'_, R> {
 /// rate d forgets it in the time 1/d. What has come to rest where its rate is a difference of large terms is no better known, and a
 /// step that knew it better would be of no length.
 fn blur(couplings: &[(u32, u32)], partials: &[f64], y: &[f64], h: f64, out: &mut Vec<f64>) {
-    /// Roundings of a rate, in units of that of its largest term.
-    const ROUNDINGS: f64 = 4.0;
     out.clear();
     out.resize(y.len(), 0.0);
     for (&(row, column), slope) in couplings.iter().zip(partials) {
@@ -83,6 +83,28 @@ fn blur(couplings: &[(u32, u32)], partials: &[f64], y: &[f64], h: f64, out: &mut
     }
     for (&(row, _), slope) in couplings.iter().zip(partials).filter(|((row, column), _)| row == column) {
         out[row as usize] /= 1.0 + (h * slope).abs();
+    }
+}
+
+/// Roundings of a rate, in units of that of its largest term, or of time.
+const ROUNDINGS: f64 = 4.0;
+/// Where in a step rates that depend on time are evaluated for their change.
+const LATER: f64 = 0.25;
+
+impl Radau {
+    /// Rates that depend on time are known as well as time is: what begins at an instant within an age is not known to its own digits at once.
+    fn blur_of_time(&mut self, work: &mut Workspace, system: &mut impl Rates, Step { y, h, .. }: Step<'_>) {
+        self.blur_of_time.clear();
+        if work.tick == 0.0 {
+            return;
+        }
+        work.stage[..y.len()].copy_from_slice(y);
+        work.evaluate(system, LATER * h, 1);
+        let blur = |(later, now): (&f64, &f64)| {
+            let blur = ROUNDINGS * work.tick / LATER * (later - now).abs();
+            if blur.is_finite() { blur } else { 0.0 }
+        };
+        self.blur_of_time.extend(work.k[1].iter().zip(work.rates_at_start()).map(blur));
     }
 }
 
@@ -133,6 +155,7 @@ impl OneStep for Radau {
         tolerance: f64,
     ) -> Trial {
         let Step { y, h, .. } = step;
+        self.blur_of_time(work, system, step);
         let rate = work.rates_at_start();
         let largest = y.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         self.scale.clear();
@@ -154,6 +177,9 @@ impl OneStep for Radau {
         blur(couplings, &self.partials, y, h, &mut self.blur);
         for (scale, blur) in self.scale.iter_mut().zip(&self.blur) {
             *scale = scale.max(*blur);
+        }
+        for (scale, blur) in self.scale.iter_mut().zip(&self.blur_of_time) {
+            *scale += *blur;
         }
         let modules = system.modules();
         let mut placed = Placed { system, places, values: &mut self.partials, evaluations: 0 };
