@@ -252,10 +252,15 @@ proptest! {
 /// What begins from rest at an instant within an age is not known to its own digits at once: the age that its rate reads is a rounded number.
 #[test]
 fn radau_begins_at_a_kink_within_an_age_at_any_tolerance() {
-    let text = "initial string: A(0, 0)\nA(s, o): solve do/dt = slope(cubic_growth, age - 3.05, 0, 1, 3), ds/dt = slope(cubic_growth, age, 0, 0.34, 5)";
-    for tolerance in [1e-8, 1e-10, 1e-12] {
+    let alone = "initial string: A(0, 0)\nA(s, o): solve do/dt = slope(cubic_growth, age - 3.05, 0, 1, 3), ds/dt = slope(cubic_growth, age, 0, 0.34, 5)";
+    // The same, coupled to a neighbour.
+    let coupled = "initial string: A(0, 0) B(1)\nA(s, o) > B(z): solve do/dt = slope(cubic_growth, age - 3.05, 0, 1, 3) + 0*z, ds/dt = slope(cubic_growth, age, 0, 0.34, 5)\nA(s, o) < B(z): solve dz/dt = 0.001*o - 0.1*z";
+    for (tolerance, text) in
+        [1e-8, 1e-10, 1e-12].into_iter().flat_map(|tolerance| [(tolerance, alone), (tolerance, coupled)])
+    {
         let settings = Settings { method: Method::Radau, tolerance, ..Settings::default() };
-        let strings = run(text, settings, &[10.0]).unwrap_or_else(|error| panic!("{tolerance}: {error}"));
+        let strings =
+            run(text, settings, &[10.0]).unwrap_or_else(|error| panic!("{tolerance}: {error}\n{text}"));
         let [s, o] = strings[0][0].1[..] else { panic!("two parameters") };
         assert!((s - 0.34).abs() < 1e-9 && (o - 1.0).abs() < 1e-9, "{tolerance}: {s}, {o}");
     }

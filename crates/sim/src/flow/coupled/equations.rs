@@ -216,6 +216,10 @@ impl Rates for Equations<'_> {
         self.system.table.timed
     }
 
+    fn reads_clock(&self) -> bool {
+        self.system.table.timed || self.system.table.aged
+    }
+
     fn is_algebraic(&self) -> bool {
         !self.system.algebra.is_empty()
     }

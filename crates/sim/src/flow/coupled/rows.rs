@@ -47,8 +47,9 @@ pub struct EquationTable {
     pub places: Vec<ComponentPlace>,
     /// The start of the step, from which time is counted.
     pub start: SimTime,
-    /// Some rates depend on `t` or `age`.
+    /// Some rates depend on `t`, or on `age`.
     pub timed: bool,
+    pub aged: bool,
 }
 
 /// Where a component belongs.
@@ -143,7 +144,7 @@ impl EquationTable {
     /// Removes all rows.
     pub(super) fn clear(&mut self, start: SimTime) {
         self.start = start;
-        self.timed = false;
+        (self.timed, self.aged) = (false, false);
         self.rows.clear();
         self.sources.clear();
         self.formulas.clear();

@@ -57,6 +57,7 @@ impl System {
         self.is_bare = true;
         self.modules = sections.iter().map(|section| section.system.modules).sum();
         self.table.timed = sections.iter().any(|section| section.system.table.timed);
+        self.table.aged = sections.iter().any(|section| section.system.table.aged);
         self.sections = sections;
         true
     }

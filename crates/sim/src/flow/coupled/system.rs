@@ -147,6 +147,7 @@ impl EquationTable {
         let (Some(rule), Some(solve)) = (state.rule.get(), state.solve.get()) else { return };
         let (compiled, clause) = (&rules[rule], &rules[rule].solves[solve]);
         self.timed |= clause.stepping.is_timed();
+        self.aged |= clause.stepping.is_aged();
         let first_rate = self.places.len();
         for &parameter in clause.stepping.components(state.numeric_only) {
             if let Some(Trajectory::Coupled(_)) = state.trajectories.get(parameter) {
