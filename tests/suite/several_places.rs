@@ -34,6 +34,13 @@ fn only_one_of_many_zeros_is_a_limit() {
             50.0,
         );
         assert_eq!(string[0].0, "A", "{method:?}");
+        // Away from where it rests, within the error of values of 1.
+        let string = of(
+            "initial string: A(1e-12)\nA(x):\n  solve dx/dt = sinh(x)\n  if abs(x) > 1e-11 produce C(t)",
+            5.0,
+        );
+        let there = f64::ln(10.0);
+        assert!(string[0].0 == "C" && (string[0].1[0] - there).abs() < 1e-4, "{method:?}: {string:?}");
         // A step begins beyond the limit at 0, by 1e-30, where the one before has overshot it.
         let string = of(
             "initial string: A(0.745)\nA(x):\n  solve dx/dt = -0.3*sinh(x)\n  if x*(x - 1) >= 0 produce C(x)",

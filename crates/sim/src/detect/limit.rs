@@ -63,14 +63,17 @@ impl CrossingDetector {
         let here = self.values[parameter];
         let known = KNOWN * path.error().max(f64::EPSILON) * here.abs().max(1.0);
         let limit = self.resting_place(&pivot).filter(|limit| (limit - here).abs() <= known)?;
-        if !self.rests_at(path, &pivot, limit) {
+        let bend = self.bend_at_rest(path, &pivot, limit)?;
+        // What moves away from where it rests meets something else; that it seems to, where all approach, is an error of values.
+        let leaves = (here - limit).abs() > (first - limit).abs();
+        if bend.lo > 0.0 || leaves && bend.hi >= 0.0 {
             return None;
         }
         Some(self.way_to_limit(path, atom, &pivot, [first, here], (limit, known), sign))
     }
 
-    /// True if the rate of the parameter vanishes at a place, whatever else moves.
-    fn rests_at(&mut self, path: &Path, pivot: &Pivot, place: f64) -> bool {
+    /// The derivative of the parameter's rate by the parameter at a place, if the rate vanishes there, whatever else moves.
+    fn bend_at_rest(&mut self, path: &Path, pivot: &Pivot, place: f64) -> Option<Interval> {
         let own = path.world.tree.parameters(path.state.id).len();
         let variables = path.rule.variables;
         let around = |(v, &x): (usize, &f64)| {
@@ -94,7 +97,8 @@ impl CrossingDetector {
         let Dual { value, rate: bend } = rates[pivot.output];
         // Where the bend is infinite solutions are not unique: x' = -sqrt(x) reaches 0.
         let is_smooth = !value.partial && !bend.partial && bend.magnitude().is_finite();
-        is_smooth && value.magnitude() <= 2.0 * ROUNDING * place.abs() * bend.magnitude()
+        let rests = is_smooth && value.magnitude() <= 2.0 * ROUNDING * place.abs() * bend.magnitude();
+        rests.then_some(bend)
     }
 
     /// What a difference that has had a sign says of its way from the first value of a path to one close by a limit: where it has the other sign in
