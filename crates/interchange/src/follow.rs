@@ -10,7 +10,7 @@ use std::ops::Bound;
 use dlsys_geometry::scene::Scene;
 use dlsys_session::Nursery;
 use dlsys_sim::Simulation;
-use dlsys_tree::ModuleString;
+use dlsys_tree::{ModuleString, mix};
 
 use crate::part::{Frame, distance, reach};
 use crate::sample::{Sample, Sampler};
@@ -384,13 +384,8 @@ impl Follower<'_, '_> {
 
 /// Where an interval is tested, in parts of it.
 fn aside(from: f64, to: f64) -> f64 {
-    // A number that looks random, the same whenever the interval is the same: the finalizer of splitmix64.
-    let mixed = |x: u64| {
-        let x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^ x >> 31
-    };
-    let part = (mixed(from.to_bits() ^ mixed(to.to_bits())) >> 11) as f64 / (1_u64 << 53) as f64;
+    // A number that looks random, the same whenever the interval is the same.
+    let part = (mix(from.to_bits(), to.to_bits()) >> 11) as f64 / (1_u64 << 53) as f64;
     ASIDE[0] + (ASIDE[1] - ASIDE[0]) * part
 }
 

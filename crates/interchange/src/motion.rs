@@ -144,13 +144,13 @@ impl Moved<'_> {
 
 /// See [`Moved::keys`]; times in seconds, ascending.
 fn apart<K>(all: Vec<(f32, K)>) -> (Vec<f32>, Vec<K>) {
-    /// Most that a key is moved, with its rounding.
-    const FARTHEST: f32 = 1.001 * APART;
+    // Most that a key is moved, with the rounding of times.
+    let farthest = |time: f32| 1.001 * APART + 2.0 * f32::EPSILON * time;
     let mut kept: Vec<(f32, K)> = Vec::with_capacity(all.len());
     // Before what the last key kept had to be, and the next one has to be.
     let [mut before, mut limit] = [f32::INFINITY; 2];
     for (time, key) in all.into_iter().rev() {
-        let has_room = kept.is_empty() || time - time.min(limit) <= FARTHEST && limit > -APART / 2.0;
+        let has_room = kept.is_empty() || time - time.min(limit) <= farthest(time) && limit > -APART / 2.0;
         if has_room {
             before = limit;
             kept.push((time.min(limit), key));
@@ -187,7 +187,8 @@ mod tests {
         wanted.push((0.9999, 5.0));
         let (times, keys) = apart(wanted);
         assert!(times.len() > 1000 && times[0] < APART);
-        assert!(times.windows(2).all(|pair| pair[1] - pair[0] > 0.99 * APART));
+        // The first one is brought to the beginning.
+        assert!(times[1..].windows(2).all(|pair| pair[1] - pair[0] > 0.99 * APART));
         let (last, others) = keys.split_last().expect("keys");
         assert!(
             *last == 5.0
@@ -197,5 +198,7 @@ mod tests {
             apart(vec![(0.0, 0), (0.5, 1), (0.5, 2), (0.5, 3)]),
             (vec![0.0, 0.4995, 0.5], vec![0, 1, 3])
         );
+        // Where times are half a millisecond apart.
+        assert_eq!(apart(vec![(0.0, 0), (5000.0, 1), (5000.0, 2)]).1, vec![0, 1, 2]);
     }
 }
