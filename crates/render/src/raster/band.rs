@@ -57,6 +57,8 @@ impl<const N: usize> Band<N> {
     }
 
     /// Draws these triangles in these rows, which were empty.
+    // In each of its callers: called, it took a twentieth more of the time of a picture.
+    #[inline(always)]
     pub(super) fn draw(&mut self, triangles: &impl Triangles, list: &List, rows: Range<usize>) {
         self.clear();
         self.planes.clear();
