@@ -305,7 +305,7 @@ mod tests {
         let parts = draw(1, &stage);
         assert!(parts.pixels.iter().filter(|pixel| pixel[3] > 0).count() > 1000);
         assert_eq!(parts, draw(3, &stage));
-        // In strips.
+        // Where hidden ones are dropped early.
         for (threads, most) in [(1, 20_000), (3, 5_000), (2, 1)] {
             assert_eq!(parts, shot::draw_within(most, &raster::FOUR, threads, &stage, &lens, &lighting));
         }
