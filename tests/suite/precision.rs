@@ -174,7 +174,9 @@ fn twins_are_integrated_once_and_live_as_if_they_were_alone() {
     // What is not evaluated again where one module goes on alone is evaluated twice where many take turns.
     assert!(work_of_twins < 2 * work, "{work_of_twins} evaluations, {work} for one");
     let (mixed, _) = at_end("A(0.1, 1) B(0.5) A(0.1, 1) A(0.11, 1)");
-    assert!(mixed.iter().filter(|m| **m == one[0]).count() >= twins.len(), "{}", mixed.len());
+    // With others in between, steps begin with other lengths.
+    let is_near = |m: &&(String, Vec<f64>)| m.1.iter().zip(&one[0].1).all(|(a, b)| (a - b).abs() < 1e-6);
+    assert!(mixed.iter().filter(is_near).count() >= twins.len(), "{}", mixed.len());
 }
 
 #[test]

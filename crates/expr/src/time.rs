@@ -54,6 +54,12 @@ impl SimTime {
         self.high
     }
 
+    /// The bits of both floats, the larger first: to compare instants, or to hash them.
+    #[inline]
+    pub fn bits(self) -> [u64; 2] {
+        [self.high.to_bits(), self.low.to_bits()]
+    }
+
     /// Events closer together than this are one instant (LANGUAGE, "Events"): a few units in the last
     /// place of `t`.
     #[inline]

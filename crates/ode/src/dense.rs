@@ -33,7 +33,7 @@ const fn bernstein(at: f64) -> [[f64; 8]; 2] {
 pub type Coefficients = [f64; MAX_DEGREE + 1];
 
 /// All components of the solution from `start` to `start + h`.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Dense {
     /// Time at position 0.
     pub start: SimTime,
@@ -48,6 +48,22 @@ pub struct Dense {
     degree: usize,
     /// `degree + 1` coefficients for each component.
     coefficients: Box<[f64]>,
+}
+
+impl Clone for Dense {
+    fn clone(&self) -> Dense {
+        let (misfits, coefficients) = (self.misfits.clone(), self.coefficients.clone());
+        Dense { misfits, coefficients, ..*self }
+    }
+
+    /// In the memory of the one that is replaced, if both are alike.
+    fn clone_from(&mut self, other: &Dense) {
+        let (mut misfits, mut coefficients) =
+            (std::mem::take(&mut self.misfits), std::mem::take(&mut self.coefficients));
+        misfits.clone_from(&other.misfits);
+        coefficients.clone_from(&other.coefficients);
+        *self = Dense { misfits, coefficients, ..*other };
+    }
 }
 
 impl Dense {

@@ -48,6 +48,38 @@ pub struct Experience {
     number: u32,
     /// The hurdle that is known.
     hurdle: Option<Hurdle>,
+    /// The step goes on from one of the present trajectory.
+    goes_on: bool,
+}
+
+impl Experience {
+    /// Adds what a step depends on. The length with which a trajectory begins is a guess of no consequence.
+    pub fn note(&self, numeric_only: bool, words: &mut Vec<u64>) {
+        let Experience { control, number, hurdle, goes_on } = self;
+        words.push(control.error.to_bits());
+        words.push(u64::from(*number) << 2 | u64::from(*goes_on) << 1 | u64::from(numeric_only));
+        if *goes_on {
+            let Control { size, last_error, stiffness_count, stiff, .. } = control;
+            words.extend([size.to_bits(), last_error.to_bits()]);
+            words.push(u64::from(*stiffness_count) << 1 | u64::from(*stiff));
+            words.extend(
+                hurdle
+                    .map(|Hurdle { number, size }| [u64::from(number), size.to_bits()])
+                    .into_iter()
+                    .flatten(),
+            );
+        }
+    }
+}
+
+/// A step that has been made, and the experience with which the module goes on.
+#[derive(Clone, Debug)]
+pub struct Made {
+    pub dense: Dense,
+    pub control: Control,
+    /// See [`Step`].
+    pub number: u32,
+    pub hurdle: Option<Hurdle>,
 }
 
 /// The equations of one module that is integrated alone.
@@ -239,7 +271,7 @@ impl FlowStage<'_, '_> {
         }
         // The experience of other modules tells nothing about the error of this one's values.
         control.error = last.map_or(0.0, |s| s.control.error);
-        Experience { control, number, hurdle }
+        Experience { control, number, hurdle, goes_on: last.is_some_and(|s| s.live) }
     }
 
     /// Makes a step of a module from its values in the tree, with this experience; returns its length.
@@ -252,8 +284,7 @@ impl FlowStage<'_, '_> {
         from: SimTime,
         experience: Experience,
     ) -> Result<f64, Error> {
-        let solve = self.world.state(id).and_then(|state| state.solve.get()).expect("has equations");
-        let Experience { mut control, number, mut hurdle } = experience;
+        let Experience { mut control, number, mut hurdle, .. } = experience;
         let rejected = self.log.stats.rejected;
         let dense = self.make_own_step(id, from, &mut control).map_err(|error| {
             let own = |component: usize| {
@@ -269,8 +300,19 @@ impl FlowStage<'_, '_> {
         }
         let h = dense.h;
         self.flows.independent_last = Some((id, dense.end));
+        self.take_step(id, from, Made { dense, control, number, hurdle })?;
+        Ok(h)
+    }
+
+    /// Gives a module the step that leads on from an instant.
+    ///
+    /// # Errors
+    /// If steps hardly advance time.
+    pub fn take_step(&mut self, id: ModuleId, from: SimTime, made: Made) -> Result<(), Error> {
         let fixed = self.setup.settings.method.is_fixed_step();
-        let state = self.world.state_mut(id).expect("seen above");
+        let state = self.world.state_mut(id).expect("a module with a rule");
+        let solve = state.solve.get().expect("has equations");
+        let Made { dense, control, number, hurdle } = made;
         let crawling = match &mut state.step {
             Some(step) => {
                 if !step.live {
@@ -304,7 +346,7 @@ impl FlowStage<'_, '_> {
         if crawling && !fixed {
             return Err(self.step_error(StepError::StepTooSmall(0), from, |_| Some((id, 0))));
         }
-        Ok(h)
+        Ok(())
     }
 
     /// Makes a step of a module that overlooks no pulse; shorter ones are tried until one does.

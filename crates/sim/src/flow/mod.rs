@@ -2,13 +2,14 @@
 //!
 //! ```text
 //! start_trajectories ─▶ closed_form            a formula, evaluated and never stepped
-//!               ─▶ independent            steps of the module alone, ─▶ twins  or of one that is alike
+//!               ─▶ independent            steps of the module alone, ─▶ alike  or of one that is alike
 //!               ─▶ coupled                one step for all modules that read one another
 //! look_ahead    ─▶ detect (zero crossings) ─▶ schedule
 //! prediction: the whole life of a module whose parameters all have closed forms, as one function
 //! ```
 
 pub mod algebraic;
+mod alike;
 pub mod closed_form;
 pub mod coupled;
 mod independent;
@@ -17,7 +18,6 @@ pub mod known_rates;
 pub mod lazy;
 pub mod prediction;
 mod rates;
-mod twins;
 
 use crate::detect::Detector;
 use crate::detect::crossing::needs_search;
@@ -31,15 +31,15 @@ use crate::world::neighbours::Neighbours;
 use crate::world::path::Path;
 use crate::world::state::{Change, Next, NextKind};
 use crate::world::{Instant, World};
+use alike::KnownSteps;
 use coupled::Coupled;
 use dlsys_model::{Model, Sign};
 use dlsys_ode::Dense;
 use dlsys_tree::{ModuleId, SimTime};
-use independent::{Experience, Hint};
+use independent::Hint;
 use integrator::Integrator;
 use known_rates::KnownRates;
 use smallvec::SmallVec;
-use twins::LastStep;
 
 pub use integrator::next_grid_time;
 
@@ -59,7 +59,7 @@ pub struct Flows {
     /// Steps of modules that are integrated alone, and the module and end of the last one.
     independent: Integrator,
     independent_last: Option<(ModuleId, SimTime)>,
-    last_step: Option<LastStep>,
+    known_steps: KnownSteps,
     /// The experience of step control, by kind and number of the clause: modules of one kind under different rules take
     /// the same steps.
     hints: Vec<Vec<Hint>>,
@@ -80,7 +80,7 @@ impl Flows {
             lazy_algebra: algebraic.any(|a| (0..a.of.len()).any(|place| a.is_lazy(place))),
             independent: Integrator::default(),
             independent_last: None,
-            last_step: None,
+            known_steps: KnownSteps::new(model),
             hints: hints.collect(),
             known_rates: KnownRates::default(),
             trajectories: Vec::new(),
@@ -208,9 +208,11 @@ impl FlowStage<'_, '_> {
         state.next = state.next.again();
         let searched = !numeric && needs_search(state, rule);
         let experience = numeric.then(|| self.experience(id));
-        if experience.is_some_and(|own| self.follow_twin(id, from, &own.control)) {
-            return Ok(());
-        }
+        let is_kept = match experience.map(|own| self.follow_alike(id, from, &own)) {
+            Some(Ok(followed)) => return followed,
+            Some(Err(is_kept)) => is_kept,
+            None => false,
+        };
         let (h, limit) = if let Some(experience) = experience {
             match self.step_independent(id, from, experience) {
                 Ok(h) => (h, 1.0),
@@ -259,8 +261,8 @@ impl FlowStage<'_, '_> {
             self.schedule.schedule(who, at);
         }
         self.detector.note_approach(index.unwrap_or(0), near, before, at);
-        if let Some(Experience { control, .. }) = experience {
-            self.flows.last_step = Some(LastStep { id, from, control, near: before, at });
+        if is_kept {
+            self.keep_step(id, at);
         }
         Ok(())
     }

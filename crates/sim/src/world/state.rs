@@ -151,6 +151,14 @@ impl Next {
         next
     }
 
+    /// The same at other times.
+    pub fn moved(&self, time: impl Fn(SimTime) -> SimTime) -> Next {
+        let mut moved = self.clone();
+        let changes = moved.ahead.iter_mut().flat_map(|ahead| &mut ahead.changes);
+        changes.for_each(|change| change.time = time(change.time));
+        moved
+    }
+
     /// Atoms, one bit each, whose sides are nearer each other than the error of integration: mostly none.
     pub fn near(&self) -> u64 {
         self.ahead.as_ref().map_or(0, |ahead| ahead.near)

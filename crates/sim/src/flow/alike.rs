@@ -1,0 +1,209 @@
+//! Modules that are integrated alone and alike: those of one kind that stand with the same values under the same equations, and read
+//! nothing else. One step, and one search of it, is made for the first of them; the others follow it, at the same instant or later.
+//!
+//! Divisions into equals make them, a tree whose branches are alike, and organs that all begin with the same values: their lives are one
+//! life at many times. What has been found for a step is kept by all that it depends on ([`Standing`]), as long as no other step takes its place.
+//!
+//! Times are kept as durations since the start of the step, so a follower is exactly where it would be if its own step had been made,
+//! but for the rounding of times. What the resolution of time decides (which events are one instant) changes with its size; so an instant
+//! counts by its power of two even where equations read no time.
+
+use std::hash::Hasher;
+use std::sync::Arc;
+
+use rustc_hash::FxHasher;
+
+use crate::error::Error;
+use crate::flow::FlowStage;
+use crate::flow::independent::{Experience, Made};
+use crate::schedule::Owner;
+use crate::trajectory::Trajectory;
+use crate::world::state::{Next, NextKind, State, Step};
+use dlsys_model::{Model, Rule, Solve};
+use dlsys_tree::{ModuleId, SimTime};
+
+/// So many steps are kept.
+const PLACES: usize = 1024;
+/// Modules with more parameters are none for which steps are kept: those may be large.
+const MOST_PARAMETERS: usize = 32;
+
+/// All that a step, and what is found in it, depends on, as words; and a hash of them.
+#[derive(Debug, Default, PartialEq)]
+struct Standing {
+    hash: u64,
+    words: Vec<u64>,
+}
+
+impl Clone for Standing {
+    fn clone(&self) -> Standing {
+        Standing { hash: self.hash, words: self.words.clone() }
+    }
+
+    fn clone_from(&mut self, other: &Standing) {
+        self.hash = other.hash;
+        self.words.clone_from(&other.words);
+    }
+}
+
+/// A step that has been made and searched.
+#[derive(Debug)]
+pub struct KnownStep {
+    standing: Standing,
+    made: Made,
+    /// What has been found, and the time of the module's entry in the schedule.
+    next: Next,
+    at: SimTime,
+}
+
+/// Steps that have been made, by hash. A step takes the place of one of the same hash.
+#[derive(Clone, Debug, Default)]
+pub struct KnownSteps {
+    /// By rule and clause.
+    readings: Vec<Vec<Reading>>,
+    /// Empty before the first is known.
+    places: Vec<Option<Arc<KnownStep>>>,
+    /// How the module stands whose step is being made.
+    now: Standing,
+}
+
+/// What the equations and conditions of a rule read under a clause: the module's own parameters, one bit each, and whether they read the time.
+#[derive(Clone, Copy, Debug)]
+struct Reading {
+    parameters: u32,
+    time: bool,
+}
+
+impl KnownSteps {
+    pub fn new(model: &Model) -> KnownSteps {
+        let reading = |rule: &Rule, solve: &Solve| {
+            let both = [&solve.rates, &rule.sides].into_iter().flat_map(|program| program.reads());
+            let own = both.clone().filter(|variable| **variable < rule.parameters.len().min(MOST_PARAMETERS));
+            let parameters = own.fold(0, |all, parameter| all | 1 << parameter);
+            Reading { parameters, time: both.clone().any(|variable| *variable == rule.time_variable()) }
+        };
+        let readings = (model.rules.iter())
+            .map(|rule| rule.solves.iter().map(|solve| reading(rule, solve)).collect())
+            .collect();
+        KnownSteps { readings, ..KnownSteps::default() }
+    }
+
+    fn place(hash: u64) -> usize {
+        (hash >> (u64::BITS - PLACES.ilog2())) as usize
+    }
+
+    /// The step of a module that stood like the present one.
+    fn get(&self) -> Option<Arc<KnownStep>> {
+        let known = self.places.get(KnownSteps::place(self.now.hash))?.as_ref()?;
+        (known.standing == self.now).then(|| known.clone())
+    }
+
+    /// Keeps the step of the present module, in the memory of the one whose place it takes.
+    fn keep(&mut self, step: &Step, next: &Next, at: SimTime) {
+        if self.places.is_empty() {
+            self.places.resize(PLACES, None);
+        }
+        let KnownSteps { places, now, .. } = self;
+        let Step { dense, control, number, hurdle, .. } = step;
+        let place = &mut places[KnownSteps::place(now.hash)];
+        match place.as_mut().and_then(Arc::get_mut) {
+            Some(known) => {
+                known.standing.clone_from(now);
+                known.made.dense.clone_from(dense);
+                (known.made.control, known.made.number, known.made.hurdle) = (*control, *number, *hurdle);
+                (known.next, known.at) = (next.clone(), at);
+            }
+            None => {
+                let (standing, dense) = (now.clone(), dense.clone());
+                let made = Made { dense, control: *control, number: *number, hurdle: *hurdle };
+                *place = Some(Arc::new(KnownStep { standing, made, next: next.clone(), at }));
+            }
+        }
+    }
+}
+
+impl FlowStage<'_, '_> {
+    /// Makes the step of a module that stood like this one, with what was found in it, its own. If there is none, says whether its step is
+    /// worth being kept: `Err(true)`.
+    pub(super) fn follow_alike(
+        &mut self,
+        id: ModuleId,
+        from: SimTime,
+        experience: &Experience,
+    ) -> Result<Result<(), Error>, bool> {
+        if !self.stand(id, from, experience) {
+            return Err(false);
+        }
+        let Some(known) = self.flows.known_steps.get() else { return Err(true) };
+        // Steps of one standing at one instant are the same to the last bit.
+        let start = known.made.dense.start;
+        let moved = |time: SimTime| if from == start { time } else { from.after(time.since(start)) };
+        let mut made = known.made.clone();
+        (made.dense.start, made.dense.end) = (from, moved(made.dense.end));
+        if let Err(error) = self.take_step(id, from, made) {
+            return Ok(Err(error));
+        }
+        let state = self.world.state_mut(id).expect("has a step");
+        let (near, index) = (state.next.near(), state.rule.get());
+        state.next = known.next.moved(moved);
+        self.schedule.schedule(Owner::Module(id.slot() as u32), moved(known.at));
+        self.detector.note_approach(index.unwrap_or(0), known.next.near(), near, moved(known.at));
+        Ok(Ok(()))
+    }
+
+    /// Keeps the step that a module has made since [`follow_alike`](Self::follow_alike) asked for it, and that goes on at an instant.
+    pub(super) fn keep_step(&mut self, id: ModuleId, at: SimTime) {
+        let Some(state) = self.world.state(id) else { return };
+        let is_plain = matches!(state.next.kind, NextKind::Event | NextKind::Window);
+        if let Some(step) = state.step.as_ref().filter(|_| is_plain) {
+            self.flows.known_steps.keep(step, &state.next, at);
+        }
+    }
+
+    /// Notes how a module stands before a step. False if its steps depend on anything else.
+    fn stand(&mut self, id: ModuleId, from: SimTime, experience: &Experience) -> bool {
+        let tree = &self.world.tree;
+        let (Some(state), values) = (self.world.state(id), tree.parameters(id)) else { return false };
+        let (Some(index), Some(solve)) = (state.rule.get(), state.solve.get()) else { return false };
+        let rule = &self.setup.model.rules[index];
+        if values.len() > MOST_PARAMETERS || !reads_nothing_else(state, rule, solve) {
+            return false;
+        }
+        let KnownSteps { readings, now: Standing { hash, words }, .. } = &mut self.flows.known_steps;
+        let Reading { parameters, time: reads_time } = &readings[index][solve];
+        words.clear();
+        words.push((index as u64) << 32 | solve as u64);
+        words.push(tree.kind(id).index() as u64);
+        for (parameter, value) in values.iter().enumerate() {
+            if parameters & 1 << parameter != 0
+                || matches!(state.trajectories.get(parameter), Some(Trajectory::Step(_)))
+            {
+                words.push(value.to_bits());
+            }
+        }
+        state.signs.iter().for_each(|sign| words.push(*sign as u64));
+        state.switches.iter().for_each(|on| words.push(u64::from(*on)));
+        words.push(state.next.near());
+        words.push(from.since(state.since).to_bits());
+        words.push(from.since(tree.birth(id)).to_bits());
+        experience.note(state.numeric_only, words);
+        let [high, low] = from.bits();
+        if *reads_time || self.setup.settings.method.is_fixed_step() {
+            words.extend([high, low]);
+        } else {
+            words.push(high >> (f64::MANTISSA_DIGITS - 1));
+        }
+        let mut hasher = FxHasher::default();
+        words.iter().for_each(|word| hasher.write_u64(*word));
+        *hash = hasher.finish();
+        true
+    }
+}
+
+/// Whether the steps of a module depend on nothing but itself and the time.
+fn reads_nothing_else(state: &State, rule: &Rule, solve: usize) -> bool {
+    let programs = [&rule.solves[solve].rates, &rule.sides];
+    !state.coupled
+        && state.context.context().is_empty()
+        && rule.aggregates.is_empty()
+        && programs.iter().all(|program| program.stretch().is_infinite())
+}
