@@ -138,7 +138,8 @@ fn restarts(rows: &mut Vec<Row>) -> Result<(), String> {
         let mut numeric = Vec::new();
         for life in [restart::sine(), restart::short()] {
             let theirs = loops(&life, target)?;
-            rows.push(race_restarts(&life, target, &theirs, 1.0, "")?);
+            rows.push(race_restarts(&life, target, &theirs, 1.0, " (alike)")?);
+            rows.push(race_restarts(&life.differing(), target, &theirs, 1.0, " (all different)")?);
             numeric.push(theirs);
         }
         // The closed form: against diffsol on the same equation, and on the shorter one that has no closed form.
