@@ -160,7 +160,14 @@ impl EventStage<'_, '_> {
                 // A sign that has just turned, by no more than rounding, turns at this instant.
                 let turned = followed.as_ref().is_some_and(|f| f.0[atom] == opposite(Sign::of(difference)));
                 let tolerance = if turned { TOUCH } else { EQUAL };
-                let equal = size.is_finite() && difference.abs() <= tolerance * size;
+                // What is a difference of larger terms is known no better than these.
+                let is_rounding = || {
+                    followed.is_none()
+                        && !rule.jumping_whole[atom]
+                        && difference.abs() <= NEAR * scale
+                        && difference.abs() <= noise(rule, atom, &self.scratch.variables, EQUAL)
+                };
+                let equal = size.is_finite() && (difference.abs() <= tolerance * size || is_rounding());
                 // By no more than the error of integration: it goes on with the sign that it had.
                 if let Some((signs, error)) = followed.as_ref().filter(|f| turned && !equal && f.1 > 0.0)
                     && difference.abs() <= noise(rule, atom, &self.scratch.variables, *error)
