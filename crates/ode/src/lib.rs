@@ -36,5 +36,6 @@ pub use one_step::{InteriorError, OneStep, Step, Trial};
 pub use rates::{Part, Rates};
 pub use roots::{Function, Root, first_root};
 pub use sparse::{Complex, Field, Pattern, Wide};
-pub use stepper::{Reached, Stepper};
+pub use stepper::Stepper;
+pub use workspace::Reached;
 pub use workspace::Workspace;

@@ -16,6 +16,16 @@ pub trait Rates {
     /// Writes the partial derivatives at `(tau, y)` to `out`: one for each of [`couplings`](Rates::couplings), in the same order.
     fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>);
 
+    /// True if the partial derivatives are the same for all states and times. False by default.
+    fn is_linear(&self) -> bool {
+        false
+    }
+
+    /// True if the rates depend on the state alone. False by default.
+    fn is_steady(&self) -> bool {
+        false
+    }
+
     /// Adds to `out` the error of each rate by the rounding of its terms, where these are known: `tanh(50*t) - 1` may be much less than both. Nothing
     /// by default.
     fn add_rounding(&mut self, _tau: f64, _y: &[f64], _out: &mut [f64]) {}
@@ -86,6 +96,14 @@ impl<R: Rates> Rates for Shifted<'_, R> {
 
     fn partials(&mut self, tau: f64, y: &[f64], out: &mut Vec<f64>) {
         self.system.partials(self.by + tau, y, out);
+    }
+
+    fn is_linear(&self) -> bool {
+        self.system.is_linear()
+    }
+
+    fn is_steady(&self) -> bool {
+        self.system.is_steady()
     }
 
     fn modules(&self) -> u64 {

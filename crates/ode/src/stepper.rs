@@ -5,7 +5,7 @@ use crate::dense::Dense;
 use crate::methods::{Scheme, Schemes};
 use crate::one_step::{InteriorError, Step, Trial};
 use crate::rates::Shifted;
-use crate::workspace::Workspace;
+use crate::workspace::{Reached, Workspace};
 use crate::{Error, Method, Rates};
 use dlsys_expr::SimTime;
 
@@ -113,22 +113,6 @@ pub struct Stepper {
     rejected: u64,
 }
 
-/// The range of each component among the states at which the rates were evaluated in a step.
-#[derive(Clone, Copy, Debug)]
-pub struct Reached<'s> {
-    /// The least value of each component.
-    pub least: &'s [f64],
-    /// The greatest.
-    pub greatest: &'s [f64],
-}
-
-impl Reached<'_> {
-    /// The least and the greatest value of a component; None if there is no such component.
-    pub fn of(&self, component: usize) -> Option<(f64, f64)> {
-        Some((*self.least.get(component)?, *self.greatest.get(component)?))
-    }
-}
-
 /// The tries of one step.
 struct Tries {
     scheme: Scheme,
@@ -185,6 +169,11 @@ impl Stepper {
     /// Evaluations of the equations of single modules so far ([`Rates::modules`] for each evaluation of the rates).
     pub fn evaluations(&self) -> u64 {
         self.work.evaluations
+    }
+
+    /// What all steps have cost so far, about, in evaluations of one module's equations.
+    pub fn cost(&self) -> u64 {
+        self.work.cost()
     }
 
     /// Steps made and steps rejected so far.
@@ -301,6 +290,7 @@ impl Stepper {
                 return Err(Error::StepTooSmall(self.work.worst(y)));
             }
             let step = Step { y, start, h };
+            self.work.trials += system.modules();
             match self.schemes.attempt(tries.scheme, &mut self.work, system, step, tries.tolerance) {
                 Trial::Diverged => {
                     self.rejected += 1;

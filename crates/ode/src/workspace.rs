@@ -17,12 +17,31 @@ pub(crate) fn part_of_sum(tolerance: f64) -> f64 {
 const INSTANT: f64 = 1e4;
 const NOTHING: f64 = 1e-3;
 
+/// What a step tried costs beyond its evaluations of rates, in such evaluations.
+const ELIMINATION: u64 = 8;
+
 /// Components that fit into the processor's registers together. States and rates are padded to whole multiples of this; the values
 /// in the padding mean nothing.
 pub(crate) const PART: usize = 8;
 
 /// The most stages of a method: those of DOP853 with its dense output.
 pub(crate) const MAX_STAGES: usize = 16;
+
+/// The range of each component among the states at which the rates were evaluated in a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Reached<'s> {
+    /// The least value of each component.
+    pub least: &'s [f64],
+    /// The greatest.
+    pub greatest: &'s [f64],
+}
+
+impl Reached<'_> {
+    /// The least and the greatest value of a component; None if there is no such component.
+    pub fn of(&self, component: usize) -> Option<(f64, f64)> {
+        Some((*self.least.get(component)?, *self.greatest.get(component)?))
+    }
+}
 
 /// Working memory of a step: states and rates of all components.
 #[derive(Clone, Debug, Default)]
@@ -54,6 +73,8 @@ pub struct Workspace {
     pub(crate) tick: f64,
     /// Evaluations of the equations of single modules so far.
     pub(crate) evaluations: u64,
+    /// Steps of single modules tried so far.
+    pub(crate) trials: u64,
     /// The components, in ascending order, that err by more than is tolerated in the step just tried, and are to be integrated again.
     pub(crate) rough: Vec<u32>,
 }
@@ -82,6 +103,11 @@ impl Workspace {
         others.map(|(_, k)| k).chain([&mut self.from, &mut self.stage]).for_each(|k| *k = Column::default());
         (self.other_end, self.states) = (Vec::new(), Vec::new());
         self.provided = (0, 0);
+    }
+
+    /// What all steps have cost so far, in evaluations of one module's equations.
+    pub(crate) fn cost(&self) -> u64 {
+        self.evaluations + ELIMINATION * self.trials
     }
 
     /// Keeps the range of the components at the stages, or does not.

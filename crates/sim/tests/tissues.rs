@@ -75,3 +75,40 @@ fn heirs_take_the_places_of_their_predecessors_in_contexts() {
     let error = difference(&auto.0, &exact.0);
     assert!(error <= 1e-5, "{error:e}");
 }
+
+/// Cells that diffuse fast and are replaced when their clocks say so. Where conditions read nothing but clocks, and the tissue is so
+/// small that an event reaches most of it, no steps are made; where they read what diffuses, they are.
+#[test]
+fn events_met_by_formulas_leave_stiff_linear_tissues_without_steps() {
+    let text = |guard: &str| {
+        format!(
+            "initial string: F_w(0, 255) G(0, 60) F_w(0, 255)\n\
+             G(i, n):\n  if n > 1 produce G(i, floor(n/2)) G(i + floor(n/2), n - floor(n/2))\n  \
+             if n = 1 produce F_v(i*0.618 - floor(i*0.618), 50 + 150*(i*0.7 - floor(i*0.7)))\n\
+             F(u, l) < F_v(x, c) > F(v, r):\n  \
+             if x < 1{guard} solve dx/dt = 1, dc/dt = 2000*(l + r - 2c) - 0.03*c\n  \
+             if x = 1{guard} produce F_v(0, 0.5*c + 60)\n"
+        )
+    };
+    let settings = Settings { tolerance: 1e-6, ..Settings::default() };
+    let reference = Settings { scheduler: Scheduler::Global, tolerance: 1e-9, ..settings };
+    let exact = state(&text(""), reference, 2.3);
+    let steps = |text: &str, times: &[f64]| {
+        let session = Session::from_text("tissue.dls", text, &[]).expect("a model");
+        let mut simulation = session.simulate(settings).expect("it starts");
+        let mut string = ModuleString::default();
+        times.iter().for_each(|t| simulation.at(*t, &mut string).expect("it runs"));
+        let values: Vec<f64> = string.iter().flat_map(|module| module.parameters.to_vec()).collect();
+        (values, simulation.stats().steps, simulation.stats().events)
+    };
+    let (clocks, read) = (steps(&text(""), &[2.3]), steps(&text(" & c > 1"), &[2.3]));
+    assert!(exact.2 && clocks.2 == exact.1 && read.2 == exact.1, "{} {} {}", clocks.2, read.2, exact.1);
+    assert!(3 * clocks.1 < read.1, "{} and {} steps", clocks.1, read.1);
+    for (values, ..) in [&clocks, &read] {
+        let error = difference(values, &exact.0);
+        assert!(error <= 1e-7, "{error:e}");
+    }
+    // The times that are asked for change nothing.
+    let often: Vec<f64> = (1..=230).map(|n| f64::from(n) / 100.0).collect();
+    assert_eq!(steps(&text(""), &often), clocks);
+}

@@ -138,6 +138,26 @@ impl Pattern {
         (n == self.parent.len()).then(|| self.parent.iter().enumerate().map(above))
     }
 
+    /// True if no entry of the diagonal is less far below 0 than the other entries of its row are large, together: then the elimination
+    /// of `shift I - scale A` lets no entry grow to more than twice the largest, for all shifts to the right of 0 and scales above 0.
+    pub fn is_dominant(&self, values: &[f64]) -> bool {
+        let n = self.unknowns();
+        let mut rest: Vec<f64> = values.iter().take(n).map(|d| -d).collect();
+        for k in 0..n {
+            for (q, &j) in (self.first[k + 1] as usize..).zip(self.row(k)) {
+                let Some(&[low, up]) =
+                    values.get(n + 2 * q..n + 2 * q + 2).and_then(|pair| pair.first_chunk())
+                else {
+                    return false;
+                };
+                rest[k] -= low.abs();
+                rest[j as usize] -= up.abs();
+            }
+        }
+        // Sums of entries that cancel are rounded.
+        rest.iter().zip(values).all(|(rest, d)| *rest >= 4.0 * f64::EPSILON * d)
+    }
+
     /// Number of whole numbers in the factors.
     fn factor_length<F: Field>(&self) -> usize {
         if self.parent.is_empty() {
@@ -268,6 +288,52 @@ impl Pattern {
                 q -= 1;
                 let above = rhs[parent as usize].scale(F::get(couplings, 2 * q));
                 rhs[k] = rhs[k].sub(above.mul(inverse));
+            }
+        }
+    }
+
+    /// Solves several real systems side by side, those of the first lane, with factors of this pattern for a shift that is real there. Does
+    /// nothing if the lengths do not agree.
+    pub fn solve_real<const N: usize, const R: usize>(&self, factors: &[Wide<N>], rhs: &mut [[f64; R]]) {
+        let n = self.unknowns();
+        if factors.len() != self.factor_length::<Wide<N>>() || rhs.len() != n {
+            return;
+        }
+        // x - factor y, for each of the right-hand sides.
+        let minus = |x: &mut [f64; R], factor: f64, y: [f64; R]| {
+            x.iter_mut().zip(y).for_each(|(x, y)| *x -= factor * y);
+        };
+        if self.parent.is_empty() {
+            for k in (0..n).rev() {
+                for (q, &i) in (self.first[k + 1] as usize..).zip(self.row(k)) {
+                    let x = rhs[k];
+                    minus(&mut rhs[i as usize], factors[n + 2 * q + 1].re[0], x);
+                }
+            }
+            for k in 0..n {
+                for (q, &j) in (self.first[k + 1] as usize..).zip(self.row(k)) {
+                    let above = rhs[j as usize];
+                    minus(&mut rhs[k], factors[n + 2 * q].re[0], above);
+                }
+                rhs[k] = rhs[k].map(|x| x * factors[k].re[0]);
+            }
+            return;
+        }
+        let (pivots, couplings) = factors.split_at(n);
+        let mut q = 0;
+        for (k, (&parent, inverse)) in self.parent.iter().zip(pivots).enumerate().rev() {
+            let x = rhs[k].map(|x| x * inverse.re[0]);
+            rhs[k] = x;
+            if parent != ROOT {
+                minus(&mut rhs[parent as usize], Wide::get(couplings, 2 * q + 1), x);
+                q += 1;
+            }
+        }
+        for (k, (&parent, inverse)) in self.parent.iter().zip(pivots).enumerate() {
+            if parent != ROOT {
+                q -= 1;
+                let above = rhs[parent as usize];
+                minus(&mut rhs[k], inverse.re[0] * Wide::get(couplings, 2 * q), above);
             }
         }
     }

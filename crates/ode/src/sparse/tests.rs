@@ -110,6 +110,17 @@ fn sparse_elimination_agrees_with_dense_elimination() {
                 }
             }
 
+            // The first lane alone, if it is real.
+            let real = Complex::from_f64(shifts[0].re);
+            let shift = Wide { im: [0.0, shifts[1].im, shifts[2].im], ..shift };
+            assert!(pattern.is_dominant(&values) && pattern.factor(&values, shift, scale, &mut factors));
+            let mut both: Vec<[f64; 2]> = rhs.iter().map(|v| [*v, -3.0 * v]).collect();
+            pattern.solve_real(&factors, &mut both);
+            for (r, x) in reference(real).iter().zip(&both) {
+                close(x[0], r.re);
+                close(x[1], -3.0 * r.re);
+            }
+
             let mut product = vec![0.0; n];
             pattern.multiply(&values, &rhs, &mut product);
             for (k, &p) in product.iter().enumerate() {
@@ -135,6 +146,23 @@ fn trees_take_linear_space_and_fill_is_bounded() {
     assert!(Pattern::new(3, &[(0, 3)]).is_none());
     let missing = Pattern::new(3, &[(0, 1), (1, 0), (2, 2), (1, 0)]).unwrap();
     assert_eq!((missing.entries(), missing.entry(2, 0), missing.entry(9, 9)), (5, None, None));
+}
+
+#[test]
+fn rows_are_dominant_whose_diagonal_outweighs_the_rest() {
+    let pattern = Pattern::new(3, &[(0, 1), (1, 0), (1, 2), (2, 1)]).unwrap();
+    let dominant = |diagonal: [f64; 3], [upper, lower]: [f64; 2]| {
+        let mut values = vec![0.0; pattern.entries()];
+        values[..3].copy_from_slice(&diagonal);
+        values[pattern.entry(1, 2).unwrap()] = upper;
+        values[pattern.entry(2, 1).unwrap()] = lower;
+        values[pattern.entry(1, 0).unwrap()] = 1.0;
+        pattern.is_dominant(&values)
+    };
+    assert!(dominant([0.0, -3.0, -1.5], [2.0, -1.5]));
+    assert!(!dominant([0.0, -3.0, -1.5], [2.1, 1.0]) && !dominant([0.0, -3.0, -1.5], [1.0, -1.6]));
+    assert!(!dominant([1.0, -3.0, -1.5], [2.0, 1.0]) && !dominant([0.0, f64::NAN, -1.5], [2.0, 1.0]));
+    assert!(!pattern.is_dominant(&[]));
 }
 
 #[test]

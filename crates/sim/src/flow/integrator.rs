@@ -99,6 +99,11 @@ impl Integrator {
         self.stepper.evaluations()
     }
 
+    /// What steps have cost so far ([`Stepper::cost`]).
+    pub fn cost(&self) -> u64 {
+        self.stepper.cost()
+    }
+
     /// Number of components.
     pub fn size(&self) -> usize {
         self.stepper.size()

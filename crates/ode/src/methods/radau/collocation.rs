@@ -22,8 +22,23 @@ pub struct Collocation<const S: usize, const L: usize> {
     /// `-L_j'(0)`: the embedded formula of order s differs from the collocation by
     /// `gamma_0 (h f(0, y) - sum_j L_j'(0) Z_j)`, gamma_0 the inverse of the real eigenvalue (IV.8).
     pub error: [f64; S],
+    /// Two places as far from the nodes as any.
+    pub between: [Between<S>; 2],
     /// Coefficient k (1 .. s, at place k - 1) of `L_j` in Bernstein form of degree s; coefficient 0 is 0.
     pub bernstein: [[f64; S]; S],
+}
+
+/// A place between two nodes.
+#[derive(Clone, Debug)]
+pub struct Between<const S: usize> {
+    /// The place, as a part of the step.
+    pub place: f64,
+    /// Values and slopes there of `L_1 .. L_s`.
+    pub values: [f64; S],
+    pub slopes: [f64; S],
+    /// The defect there in units of that at the start, for equations that are linear and read no clock: a polynomial of degree s that
+    /// vanishes at the nodes.
+    pub defect: f64,
 }
 
 impl<const S: usize, const L: usize> Collocation<S, L> {
@@ -65,17 +80,36 @@ impl<const S: usize, const L: usize> Collocation<S, L> {
         // At the end only the last stage counts.
         bernstein[S - 1] = [0.0; S];
         bernstein[S - 1][S - 1] = 1.0;
-        Collocation { nodes, lambda, inverse: invert(&vectors), vectors, error, bernstein }
+        let middle = (S - 1) / 2;
+        let between = [middle - 1, middle].map(|i| Between::at(0.5 * (nodes[i] + nodes[i + 1]), &nodes, all));
+        Collocation { nodes, lambda, inverse: invert(&vectors), vectors, error, between, bernstein }
     }
 
     /// Values at `x` of the Lagrange polynomials `L_1 .. L_s` (those that vanish at 0).
     pub fn lagrange(&self, x: f64) -> [f64; S] {
-        std::array::from_fn(|j| {
-            let others = (0..S).filter(|&m| m != j);
-            let own = self.nodes[j];
-            others.fold(x / own, |p, m| p * (x - self.nodes[m]) / (own - self.nodes[m]))
-        })
+        lagrange(&self.nodes, x)
     }
+}
+
+impl<const S: usize> Between<S> {
+    /// A place that is no node; `all` are the nodes with 0 before them.
+    fn at(place: f64, nodes: &[f64; S], all: &[f64]) -> Self {
+        let values = lagrange(nodes, place);
+        let slope = |j: usize| {
+            let others = all.iter().enumerate().filter(|(m, _)| *m != j + 1);
+            values[j] * others.map(|(_, c)| 1.0 / (place - c)).sum::<f64>()
+        };
+        let defect = nodes.iter().map(|c| (place - c) / -c).product();
+        Between { place, values, slopes: std::array::from_fn(slope), defect }
+    }
+}
+
+fn lagrange<const S: usize>(nodes: &[f64; S], x: f64) -> [f64; S] {
+    std::array::from_fn(|j| {
+        let others = (0..S).filter(|&m| m != j);
+        let own = nodes[j];
+        others.fold(x / own, |p, m| p * (x - nodes[m]) / (own - nodes[m]))
+    })
 }
 
 /// Zeros of `P_s(2x - 1) - P_{s-1}(2x - 1)`, P the Legendre polynomials (IV.5), by Newton's method with

@@ -17,8 +17,8 @@ use crate::dense::Dense;
 use crate::one_step::{InteriorError, OneStep, Step, Trial};
 use crate::sparse::Pattern;
 use crate::workspace::{FLOOR, Workspace};
-use dlsys_expr::{Dual, SimTime};
-use stages::{Attempt, Stages, Start, Stiff};
+use dlsys_expr::SimTime;
+use stages::{Attempt, Beginning, Form, Stages, Start, Stiff};
 
 /// Tighter than this, five stages need fewer evaluations than three.
 const FIVE_STAGES_BELOW: f64 = 1e-5;
@@ -29,6 +29,8 @@ pub struct Radau {
     /// None before the first step.
     stages: Option<Stages>,
     pattern: Option<Structure>,
+    /// The structure is that of another system, perhaps.
+    is_doubtful: bool,
     /// The partial derivatives as they were last evaluated; none before that.
     partials: Vec<f64>,
     scale: Vec<f64>,
@@ -64,6 +66,14 @@ impl<R: Rates> Stiff for Placed<'_, R> {
         self.system.partials(tau, y, self.values);
         for (&place, value) in self.places.iter().zip(&*self.values) {
             out[place] += value;
+        }
+    }
+
+    fn form(&self) -> Form {
+        match (self.system.is_linear(), self.system.is_steady()) {
+            (true, true) => Form::LinearSteady,
+            (true, false) => Form::Linear,
+            _ => Form::Any,
         }
     }
 }
@@ -122,7 +132,7 @@ impl OneStep for Radau {
     }
 
     fn forget(&mut self) {
-        self.pattern = None;
+        self.is_doubtful = true;
         self.partials.clear();
         if let Some(stages) = &mut self.stages {
             stages.forget();
@@ -164,10 +174,17 @@ impl OneStep for Radau {
         let scale = |(y, f): (&f64, &f64)| tolerance * (y.abs().max((h * f).abs().min(largest)) + FLOOR);
         self.scale.extend(y.iter().zip(rate).map(scale));
         let Some(stages) = &mut self.stages else { return Trial::Diverged };
+        let others = std::mem::take(&mut self.is_doubtful).then(|| system.couplings());
+        // Mostly a system has the couplings of the one before.
+        let is_same = |known: &Structure, couplings: &Vec<(u32, u32)>| {
+            known.pattern.unknowns() == y.len() && known.couplings == *couplings
+        };
+        let is_other = |known: &mut Structure| others.as_ref().is_some_and(|others| !is_same(known, others));
+        self.pattern.take_if(is_other);
         let Structure { pattern, couplings, places } = match &mut self.pattern {
             Some(known) => known,
             unknown => {
-                let couplings = system.couplings();
+                let couplings = others.unwrap_or_else(|| system.couplings());
                 let Some(pattern) = Pattern::new(y.len(), &couplings) else { return Trial::Diverged };
                 let place = |&(row, column): &(u32, u32)| pattern.entry(row as usize, column as usize);
                 let places = couplings.iter().filter_map(place).collect();
@@ -206,7 +223,7 @@ impl OneStep for Radau {
             stages.dense(step.y, &mut self.coefficients);
             stages.count()
         });
-        Dense::new(step.start, None, step.h, count, self.coefficients.clone())
+        Dense::new(step.start, None, step.h, count, std::mem::take(&mut self.coefficients))
     }
 
     /// By the defect between stages, the difference between the rates of the equations and that of the output, filtered as the estimate
@@ -216,33 +233,17 @@ impl OneStep for Radau {
         work: &mut Workspace,
         system: &mut impl Rates,
         y: &[f64],
-        dense: &Dense,
+        _: &Dense,
     ) -> InteriorError {
         let (Some(stages), Some(Structure { pattern, .. })) = (&self.stages, &self.pattern) else {
             return InteriorError::default();
         };
-        let (mut inside, mut slopes) = (InteriorError::default(), vec![0.0; y.len()]);
-        for place in stages.between() {
-            for (component, slope) in slopes.iter_mut().enumerate() {
-                let Dual { value, rate } = dense.departure(component, place);
-                (work.stage[component], *slope) = (value, rate);
-            }
-            work.evaluate(system, place * dense.h, 1);
-            let rates = slopes.iter().zip(work.k[1].iter());
-            let mut errors: Vec<f64> = rates.map(|(slope, rate)| dense.h * rate - slope).collect();
-            work.rough.iter().for_each(|component| errors[*component as usize] = 0.0);
-            stages.settle(pattern, &mut errors);
-            for (component, error) in errors.into_iter().enumerate() {
-                if !error.is_finite() {
-                    continue;
-                }
-                let moved = (dense.h * work.k[0][component]).abs().max(slopes[component].abs());
-                let scale = y[component].abs().max(moved).max(work.stage[component].abs()) + FLOOR;
-                inside.relative = inside.relative.max(error.abs() / scale);
-                inside.absolute = inside.absolute.max(error.abs() / y[component].abs().max(1.0));
-            }
-        }
-        inside
+        let Workspace { k, rough, evaluations, .. } = work;
+        let rates = |tau: f64, y: &[f64], out: &mut [f64]| {
+            *evaluations += system.modules();
+            system.rates(tau, y, out);
+        };
+        stages.interior_error(pattern, Beginning { y, rates: &k[0], rough }, rates)
     }
 
     fn accept(&mut self, _: &mut Workspace) -> bool {

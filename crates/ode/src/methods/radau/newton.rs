@@ -3,9 +3,13 @@
 //! Section numbers are those of E. Hairer, G. Wanner, Solving Ordinary Differential Equations II (2nd ed.
 //! 1996).
 
+mod affine;
+
 use super::collocation::Collocation;
-use super::stages::{Attempt, Start, Stiff};
+use super::stages::{Attempt, Beginning, Form, Start, Stiff};
+use crate::one_step::InteriorError;
 use crate::sparse::{Field, Pattern, Wide};
+use crate::workspace::FLOOR;
 
 /// Longest extrapolation of the collocation polynomial, in lengths of the step before.
 const EXTRAPOLATE: f64 = 10.0;
@@ -46,12 +50,19 @@ pub struct Newton<const S: usize, const L: usize> {
     rates: Vec<f64>,
     point: Vec<f64>,
     weight: Vec<f64>,
+    /// The estimated error of each component, filtered once, and filtered once more where that was done.
+    errors: Vec<[f64; 1]>,
+    again: Vec<[f64; 1]>,
     /// The estimated error of each component, in units of what is tolerated.
     pub shares: Vec<f64>,
     pub end: Vec<f64>,
     h: f64,
     /// Length of the step `before`, if there is one that ended here.
     h_before: Option<f64>,
+    /// The form of the system in the last attempt.
+    form: Form,
+    /// The longest step for which one solution of a linear system is known to be exact enough.
+    confirmed: f64,
     /// Expected ratio of remaining error to last correction (IV.8, stopping criterion).
     eta: f64,
     slow: bool,
@@ -87,10 +98,14 @@ impl<const S: usize, const L: usize> Newton<S, L> {
             rates: Vec::new(),
             point: Vec::new(),
             weight: Vec::new(),
+            errors: Vec::new(),
+            again: Vec::new(),
             shares: Vec::new(),
             end: Vec::new(),
             h: 0.0,
             h_before: None,
+            form: Form::Any,
+            confirmed: 0.0,
             eta: 1.0,
             slow: false,
             done: false,
@@ -140,7 +155,11 @@ impl<const S: usize, const L: usize> Newton<S, L> {
             Jacobian::Earlier => self.slow || again,
             Jacobian::Here => false,
         };
-        let mut outcome = self.try_newton(problem, start, renew, true, rounding);
+        self.form = problem.form();
+        let mut outcome = match self.form {
+            Form::Any => self.try_newton(problem, start, renew, true, rounding),
+            _ => self.try_linear(problem, start, rounding),
+        };
         if let Err(failure) = outcome {
             // An old Jacobian or a wild extrapolation must not be the reason.
             let finite = failure == Attempt::Diverged;
@@ -206,28 +225,7 @@ impl<const S: usize, const L: usize> Newton<S, L> {
         extrapolate: bool,
         rounding: f64,
     ) -> Iterations {
-        if renew {
-            self.candidate.fill(0.0);
-            problem.jacobian(0.0, start.y, &mut self.candidate);
-            if self.candidate.iter().any(|v| !v.is_finite()) {
-                self.known = Jacobian::Unknown;
-                return Err(Attempt::NotFinite(None));
-            }
-            // A linear system keeps its factors.
-            if self.known == Jacobian::Unknown || self.candidate != self.jacobian {
-                std::mem::swap(&mut self.candidate, &mut self.jacobian);
-                self.factored = f64::NAN;
-            }
-            self.known = Jacobian::Here;
-        }
-        if self.factored != self.h {
-            self.factorisations += 1;
-            self.factored = self.h;
-            if !start.pattern.factor(&self.jacobian, self.lambda, self.h, &mut self.factors) {
-                self.factored = f64::NAN;
-                return Err(Attempt::Diverged);
-            }
-        }
+        self.factor(problem, start, renew)?;
         match self.h_before {
             Some(before) if extrapolate && (0.0..=EXTRAPOLATE).contains(&(self.h / before)) => {
                 self.extrapolate(self.h / before);
@@ -239,6 +237,34 @@ impl<const S: usize, const L: usize> Newton<S, L> {
             }
         }
         self.iterate(problem, start, rounding)
+    }
+
+    /// Jacobian and factors as needed.
+    fn factor(&mut self, problem: &mut impl Stiff, start: &Start<'_>, renew: bool) -> Result<(), Attempt> {
+        if renew {
+            self.candidate.fill(0.0);
+            problem.jacobian(0.0, start.y, &mut self.candidate);
+            if self.candidate.iter().any(|v| !v.is_finite()) {
+                self.known = Jacobian::Unknown;
+                return Err(Attempt::NotFinite(None));
+            }
+            // A linear system keeps its factors.
+            if self.known == Jacobian::Unknown || self.candidate != self.jacobian {
+                std::mem::swap(&mut self.candidate, &mut self.jacobian);
+                self.factored = f64::NAN;
+                self.confirmed = if start.pattern.is_dominant(&self.jacobian) { f64::INFINITY } else { 0.0 };
+            }
+            self.known = Jacobian::Here;
+        }
+        if self.factored != self.h {
+            self.factorisations += 1;
+            self.factored = self.h;
+            if !start.pattern.factor(&self.jacobian, self.lambda, self.h, &mut self.factors) {
+                self.factored = f64::NAN;
+                return Err(Attempt::Diverged);
+            }
+        }
+        Ok(())
     }
 
     /// Starting values from the collocation polynomial of the step before; `ratio` of the step lengths.
@@ -326,41 +352,93 @@ impl<const S: usize, const L: usize> Newton<S, L> {
     /// where the first value may be far too large (IV.8).
     fn estimate(&mut self, problem: &mut impl Stiff, start: &Start<'_>, twice: bool) -> f64 {
         let (y, n) = (start.y, start.y.len());
-        let mut error = self.filter(start, start.rate);
+        let mut errors = std::mem::take(&mut self.errors);
+        let mut error = self.filter(start, start.rate, &mut errors);
         if error >= 1.0 && twice {
-            for (p, (y, e)) in self.point.iter_mut().zip(y.iter().zip(&self.rhs)) {
-                *p = y + e.re[0];
+            for (p, (y, e)) in self.point.iter_mut().zip(y.iter().zip(&errors)) {
+                *p = y + e[0];
             }
             let mut rates = std::mem::take(&mut self.rates);
             problem.rates(0.0, &self.point, &mut rates[..n]);
             self.rates_used += 1;
             if rates[..n].iter().all(|f| f.is_finite()) {
-                error = self.filter(start, &rates[..n]);
+                let mut again = std::mem::take(&mut self.again);
+                error = self.filter(start, &rates[..n], &mut again);
+                self.again = again;
             }
             self.rates = rates;
         }
+        self.errors = errors;
         error
     }
 
-    /// Filtered error in the real lane of `rhs` for a given rate at the beginning; its norm.
-    fn filter(&mut self, start: &Start<'_>, rate: &[f64]) -> f64 {
+    /// Filtered error of each component for a given rate at the beginning; its norm.
+    fn filter(&mut self, start: &Start<'_>, rate: &[f64], errors: &mut Vec<[f64; 1]>) -> f64 {
         let n = rate.len();
-        for (i, rate) in rate.iter().enumerate() {
+        errors.clear();
+        errors.extend(rate.iter().enumerate().map(|(i, rate)| {
             let mut v = self.h * rate;
             (0..S).for_each(|j| v += self.table.error[j] * self.z[j * n + i]);
-            self.rhs[i] = Wide::from_f64(v);
-        }
-        start.pattern.solve(&self.factors, &mut self.rhs);
+            [v]
+        }));
+        start.pattern.solve_real(&self.factors, errors);
         self.shares.clear();
-        self.shares.extend(self.rhs.iter().zip(&self.weight).map(|(e, w)| (e.re[0] * w).abs()));
+        self.shares.extend(errors.iter().zip(&self.weight).map(|(e, w)| (e[0] * w).abs()));
         self.shares.iter().fold(0.0, |m, &v| if v > m || v.is_nan() { v } else { m })
     }
 
-    /// Filters a defect as the estimate of the error is.
-    pub fn settle(&self, pattern: &Pattern, defect: &mut [f64]) {
-        let mut wide: Vec<Wide<L>> = defect.iter().map(|v| Wide::from_f64(*v)).collect();
-        pattern.solve(&self.factors, &mut wide);
-        defect.iter_mut().zip(&wide).for_each(|(v, wide)| *v = wide.re[0]);
+    /// The error inside the last attempt done, which began at `y`: see [`Stages::interior_error`](super::stages::Stages::interior_error).
+    pub fn interior_error(
+        &self,
+        pattern: &Pattern,
+        Beginning { y, rates: at_start, rough }: Beginning<'_>,
+        mut rates: impl FnMut(f64, &[f64], &mut [f64]),
+    ) -> InteriorError {
+        let n = y.len();
+        let places = &self.table.between;
+        let sum = |i: usize, of: &[f64; S]| (0..S).map(|j| of[j] * self.z[j * n + i]).sum::<f64>();
+        // What is integrated again does not count.
+        let silence = |errors: &mut [[f64; 2]]| rough.iter().for_each(|i| errors[*i as usize] = [0.0; 2]);
+        let mut errors = vec![[0.0; 2]; n];
+        if self.form == Form::LinearSteady {
+            // The defect is known from that at the start, and so is what it leaves.
+            for (inside, [error]) in errors.iter_mut().zip(&self.errors) {
+                *inside = places.each_ref().map(|at| at.defect * error);
+            }
+        } else {
+            let (mut point, mut found) = (vec![0.0; n], vec![0.0; n]);
+            for (number, at) in places.iter().enumerate() {
+                for (i, (point, y)) in point.iter_mut().zip(y).enumerate() {
+                    *point = y + sum(i, &at.values);
+                }
+                rates(at.place * self.h, &point, &mut found);
+                for (i, (error, rate)) in errors.iter_mut().zip(&found).enumerate() {
+                    error[number] = self.h * rate - sum(i, &at.slopes);
+                }
+            }
+            silence(&mut errors);
+            pattern.solve_real(&self.factors, &mut errors);
+        }
+        silence(&mut errors);
+        let mut worst = InteriorError::default();
+        for (i, errors) in errors.into_iter().enumerate() {
+            let size = y[i].abs();
+            for (error, at) in errors.into_iter().zip(places) {
+                let error = error.abs();
+                if !error.is_finite() {
+                    continue;
+                }
+                worst.absolute = worst.absolute.max(error / size.max(1.0));
+                // A value that is larger on its way makes the error less.
+                let scale = size.max((self.h * at_start[i]).abs()) + FLOOR;
+                if error > worst.relative * scale {
+                    let slope = sum(i, &at.slopes).abs();
+                    let scale = scale.max(slope).max((y[i] + sum(i, &at.values)).abs());
+                    worst.relative = worst.relative.max(error / scale);
+                }
+            }
+        }
+        worst
     }
 
     pub fn dense(&self, y: &[f64], out: &mut Vec<f64>) {

@@ -1,14 +1,30 @@
 //! What a Radau IIA step needs of its system, and the choice between three and five stages.
 
 use super::newton::Newton;
+use crate::one_step::InteriorError;
 use crate::sparse::Pattern;
 
 /// A system y' = f(tau, y); `tau` is the time since the beginning of the step tried.
 pub trait Stiff {
     /// Writes f(tau, y) to `out`.
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]);
-    /// Writes df/dy at places `Pattern::entry` of `out`, which is filled with 0 before. Need not be exact.
+    /// Writes df/dy at places `Pattern::entry` of `out`, which is filled with 0 before. Need not be exact, unless the system is linear.
     fn jacobian(&mut self, tau: f64, y: &[f64], out: &mut [f64]);
+    /// What is known of the system beforehand.
+    fn form(&self) -> Form {
+        Form::Any
+    }
+}
+
+/// What is known of a system beforehand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    /// Nothing.
+    Any,
+    /// df/dy is the same everywhere.
+    Linear,
+    /// And f depends on y alone.
+    LinearSteady,
 }
 
 /// The start of a step.
@@ -42,6 +58,17 @@ pub enum Attempt {
     Diverged,
     /// A value is not finite: the component if it is known; `None` also for arguments that make no sense.
     NotFinite(Option<usize>),
+}
+
+/// What an attempt began with.
+#[derive(Clone, Copy)]
+pub struct Beginning<'a> {
+    /// The state.
+    pub y: &'a [f64],
+    /// Its rates.
+    pub rates: &'a [f64],
+    /// The components that are integrated again.
+    pub rough: &'a [u32],
 }
 
 /// The method of three or of five stages. Holds the work space, the Jacobian and its factors, and the step before.
@@ -82,17 +109,15 @@ impl Stages {
         each!(self, newton => newton.nodes())
     }
 
-    /// Two places in a step as far from nodes as any.
-    pub fn between(&self) -> [f64; 2] {
-        match self.nodes() {
-            [a, b, c] => [0.5 * (a + b), 0.5 * (b + c)],
-            nodes => [0.5 * (nodes[1] + nodes[2]), 0.5 * (nodes[2] + nodes[3])],
-        }
-    }
-
-    /// Replaces a defect, in units of the components, with the errors of the last attempt done that would leave it.
-    pub fn settle(&self, pattern: &Pattern, defect: &mut [f64]) {
-        each!(self, newton => newton.settle(pattern, defect));
+    /// The error inside the last attempt done, at two places between stages: by the defect, the difference between the rates of the
+    /// equations and that of the output, filtered as the estimate at the end is. `rates` evaluates rates.
+    pub fn interior_error(
+        &self,
+        pattern: &Pattern,
+        beginning: Beginning<'_>,
+        rates: impl FnMut(f64, &[f64], &mut [f64]),
+    ) -> InteriorError {
+        each!(self, newton => newton.interior_error(pattern, beginning, rates))
     }
 
     /// Tries a step of length `h` (not 0). An attempt after one that was not accepted must have the same start, else call

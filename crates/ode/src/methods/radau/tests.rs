@@ -1,6 +1,6 @@
 //! Tests of the Radau IIA steps: orders, stiff references, cost.
 
-use super::stages::{Attempt, Stages, Start, Stiff};
+use super::stages::{Attempt, Beginning, Form, Stages, Start, Stiff};
 use crate::sparse::Pattern;
 
 /// A system of rates and a Jacobian in absolute time, with the time of the step's beginning.
@@ -215,6 +215,101 @@ fn a_stiff_diffusion_chain_is_exact_within_tolerance_in_few_steps() {
         let error = y.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         println!("chain of {n}, {stages} stages, {tolerance:e}: error {error:.1e}, {time:.0} us, {cost:?}");
         assert!(error < 255.0 * tolerance.max(1e-13) && cost.steps <= most, "{error:e} {cost:?}");
+    }
+}
+
+/// A linear chain driven by its neighbours, and by a wave if it is not steady; of a form that may be less than it has.
+struct Driven {
+    form: Form,
+    wave: f64,
+    /// Influences of the next and of the last cell.
+    couplings: [f64; 2],
+}
+
+impl Stiff for Driven {
+    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+        let [next, last] = self.couplings;
+        for i in 0..y.len() {
+            let of = |i: usize| y.get(i).copied().unwrap_or(0.0);
+            out[i] = next * of(i + 1) + last * of(i.wrapping_sub(1)) - 2.0 * y[i] + 3.0;
+            out[i] += self.wave * (5.0 * tau + i as f64).sin();
+        }
+    }
+    fn jacobian(&mut self, _: f64, y: &[f64], out: &mut [f64]) {
+        let (n, [next, last]) = (y.len(), self.couplings);
+        out[..n].fill(-2.0);
+        // Rows lie in the order of elimination: the influence of the last cell, then that of the next one on it.
+        out[n..].chunks_exact_mut(2).for_each(|pair| (pair[0], pair[1]) = (last, next));
+    }
+    fn form(&self) -> Form {
+        self.form
+    }
+}
+
+#[test]
+fn linear_systems_take_one_solution_and_give_what_iteration_gives() {
+    let n = 12;
+    let pattern = Pattern::new(n, &(1..n as u32).map(|k| (k - 1, k)).collect::<Vec<_>>()).unwrap();
+    // Dominant, and not.
+    for (couplings, wave) in [([1.0, 1.0], 0.0), ([1.0, 1.0], 4.0), ([1.9, -1.4], 0.0), ([1.9, -1.4], 4.0)] {
+        let known = if wave == 0.0 { Form::LinearSteady } else { Form::Linear };
+        for stages in [3, 5] {
+            let [any, linear] = [Form::Any, known].map(|form| {
+                let (mut radau, mut case) = (Stages::of(stages), Driven { form, wave, couplings });
+                let (mut y, mut rates, mut all) = (vec![1.0; n], vec![0.0; n], Vec::new());
+                // The second of 20 times the length of the first.
+                for h in [0.05, 1.0, 1.0] {
+                    case.rates(0.0, &y, &mut rates);
+                    let start = Start { pattern: &pattern, y: &y, rate: &rates, scale: &[1e-8; 12] };
+                    let Attempt::Done { error, .. } = radau.attempt(&mut case, &start, h) else {
+                        panic!("{couplings:?}")
+                    };
+                    let of = |tau: f64, y: &[f64], out: &mut [f64]| {
+                        Driven { form, wave, couplings }.rates(tau, y, out);
+                    };
+                    let beginning = Beginning { y: &y, rates: &rates, rough: &[4] };
+                    let inside = radau.interior_error(&pattern, beginning, of);
+                    all.push([error, 1e8 * inside.relative, 1e8 * inside.absolute]);
+                    radau.accept();
+                    y.copy_from_slice(radau.end());
+                }
+                (y, all, radau.rates_used())
+            });
+            for (a, b) in any.0.iter().zip(&linear.0) {
+                assert!((a - b).abs() < 1e-12 * a.abs(), "{a} {b}");
+            }
+            for (step, (any, linear)) in any.1.iter().zip(&linear.1).enumerate() {
+                assert!((any[0] - linear[0]).abs() < 1e-5 * (1.0 + any[0]), "{step}: {any:?} {linear:?}");
+            }
+            assert!(linear.2 < any.2, "{} and {} evaluations", linear.2, any.2);
+            if wave > 0.0 {
+                // Of a steady system the defect of what is rough is left out after it has spread.
+                let same = |(a, b): (&[f64; 3], &[f64; 3])| {
+                    (0..3).all(|i| (a[i] - b[i]).abs() < 1e-4 * (1.0 + a[i]))
+                };
+                assert!(any.1.iter().zip(&linear.1).all(same), "{any:?} {linear:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_defect_of_a_steady_linear_system_is_known_from_that_at_the_start() {
+    let n = 12;
+    let pattern = Pattern::new(n, &(1..n as u32).map(|k| (k - 1, k)).collect::<Vec<_>>()).unwrap();
+    for stages in [3, 5] {
+        let inside = [Form::Any, Form::LinearSteady].map(|form| {
+            let case = || Driven { form, wave: 0.0, couplings: [1.0, 1.0] };
+            let (mut radau, y, mut rates) = (Stages::of(stages), vec![1.0; n], vec![0.0; n]);
+            case().rates(0.0, &y, &mut rates);
+            let start = Start { pattern: &pattern, y: &y, rate: &rates, scale: &[1e-8; 12] };
+            assert!(matches!(radau.attempt(&mut case(), &start, 2.0), Attempt::Done { .. }));
+            let of = |tau: f64, y: &[f64], out: &mut [f64]| case().rates(tau, y, out);
+            radau.interior_error(&pattern, Beginning { y: &y, rates: &rates, rough: &[] }, of)
+        });
+        let [any, known] = inside.map(|inside| [inside.relative, inside.absolute]);
+        assert!(any[1] > 1e-6, "{any:?}");
+        assert!((0..2).all(|i| (any[i] - known[i]).abs() < 1e-8 * any[i]), "{any:?} {known:?}");
     }
 }
 

@@ -1,6 +1,7 @@
 //! The modules that are integrated together, determined anew at each event from those whose equations have begun there.
 
 use crate::flow::FlowStage;
+use crate::flow::coupled::Coupled;
 use std::collections::HashSet;
 
 use crate::error::Error;
@@ -77,8 +78,12 @@ impl FlowStage<'_, '_> {
         if seeds.is_empty() || self.reintegrate(seeds, joined) {
             return Ok(());
         }
-        if self.flows.coupled.linear.is_some() {
-            self.flows.coupled.cuts += 1;
+        let Coupled { linear, cuts, traffic, .. } = &mut self.flows.coupled;
+        if let Some(linear) = linear {
+            *cuts += 1;
+            if linear.has_taken_steps() {
+                traffic.take_steps();
+            }
         }
         let now = self.instant.at;
         if let Some(solution) = &self.world.coupled {

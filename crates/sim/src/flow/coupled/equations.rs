@@ -212,6 +212,14 @@ impl Rates for Equations<'_> {
         self.memory.consistent = consistent;
     }
 
+    fn is_linear(&self) -> bool {
+        self.system.is_linear
+    }
+
+    fn is_steady(&self) -> bool {
+        self.system.is_steady()
+    }
+
     fn is_timed(&self) -> bool {
         self.system.table.timed
     }
@@ -253,6 +261,12 @@ impl Rates for Equations<'_> {
         let y = if self.system.algebra.is_empty() { y } else { &consistent };
         for row in &self.system.table.rows {
             let jacobian = &self.rules[row.rule].solves[row.solve].jacobian;
+            if let Some(values) =
+                jacobian.values.constants().filter(|_| self.system.table.aggregates.is_empty())
+            {
+                self.system.row_partials(self.rules, row, |_, partial| out.push(partial.value(values, &[])));
+                continue;
+            }
             self.system.table.variables(self.rules, row, tau, y, &self.memory.inputs, &mut variables);
             values.resize(jacobian.values.outputs(), 0.0);
             jacobian.values.eval(&variables, &mut scratch, &mut values);

@@ -132,6 +132,11 @@ impl Reintegration {
         self.integrator.evaluations()
     }
 
+    /// What steps have cost so far.
+    pub fn cost(&self) -> u64 {
+        self.integrator.cost()
+    }
+
     /// The number of rings with which a re-integration over so much time begins.
     fn rings_within(&self, room: f64, stiff: Option<Cause>) -> usize {
         // Around the seeds there is one ring more than changes.
@@ -166,9 +171,8 @@ impl Reintegration {
     }
 }
 
-/// Most rings that are tried.
+/// Most rings that are tried; least and most in stiff equations.
 const MAX_RINGS: usize = 64;
-/// Least and most rings that are tried in stiff equations.
 const FEW_RINGS: usize = 3;
 const MAX_STIFF_RINGS: usize = 4096;
 /// The factor by which more rings are tried than were needed before.

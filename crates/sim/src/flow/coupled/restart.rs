@@ -1,6 +1,6 @@
 //! The start of the common trajectory of the coupled modules: who they are, their values, their equations, and the method.
 
-use crate::Method;
+use crate::detect::crossing::needs_search;
 use crate::error::Error;
 use crate::flow::FlowStage;
 use crate::flow::coupled::Coupled;
@@ -14,6 +14,7 @@ use crate::world::World;
 use crate::world::coupled_solution::CoupledSolution;
 use crate::world::prefetch::{Guide, prefetch};
 use crate::world::state::State;
+use crate::{Method, Scheduler};
 use dlsys_tree::{ModuleId, SimTime, Visit, room};
 
 /// A solution without steps begins anew, for all modules, at every event; after this many events steps are made.
@@ -37,6 +38,11 @@ impl FlowStage<'_, '_> {
         }
         if self.flows.coupled.linear.is_some() {
             self.show_coupled(at);
+            if self.setup.has_conditions {
+                let members = std::mem::take(&mut self.flows.coupled.members);
+                members.iter().for_each(|id| self.search_member(*id, at));
+                self.flows.coupled.members = members;
+            }
             return Ok(());
         }
         self.step_coupled(at)
@@ -137,10 +143,7 @@ impl FlowStage<'_, '_> {
     /// Writes the equations of the members, and solves them without steps if they are linear and no event can cut their
     /// trajectory; else prepares the integrator.
     fn choose_method(&mut self, at: SimTime) {
-        let without_steps = self.setup.settings.method == Method::Auto
-            && (self.flows.coupled.control.stiff || self.flows.coupled.cuts < MAX_CUTS)
-            && !self.setup.settings.is_sliced()
-            && !self.searches_coupled();
+        let without_steps = self.may_go_without_steps();
         let is_explicit = !self.setup.settings.method.is_implicit() && !self.flows.coupled.control.stiff;
         let is_linear = without_steps && self.flows.coupled.members.iter().all(|id| self.is_linear(*id));
         let (rules, tolerance) = (&self.setup.model.rules, self.setup.coupled_settings.tolerance);
@@ -152,7 +155,13 @@ impl FlowStage<'_, '_> {
             let Coupled { system, y, .. } = &self.flows.coupled;
             without = is_linear.then(|| Linear::new(system, rules, y, tolerance)).flatten();
         }
-        let Coupled { system, y, integrator, linear, tried, pulsing, .. } = &mut self.flows.coupled;
+        let Coupled { system, y, integrator, linear, tried, pulsing, traffic, .. } = &mut self.flows.coupled;
+        match &without {
+            Some(_) => traffic.pause(self.instant.number),
+            // It is not tried again at each event.
+            None if without_steps => traffic.take_steps(),
+            None => {}
+        }
         (*tried, *linear) = (without_steps, without);
         // After each step all members are searched.
         let is_unwatched = !self.setup.has_conditions && pulsing.is_empty() && system.algebra.is_empty();
@@ -166,6 +175,27 @@ impl FlowStage<'_, '_> {
             }
             integrator.restart(self.setup.settings.method, y.len());
         }
+    }
+
+    /// True if a solution without steps is to be tried: no event can cut the common trajectory, or each is met by a formula and a solution
+    /// for all modules takes less than an event does in steps.
+    pub(super) fn may_go_without_steps(&self) -> bool {
+        let settings = &self.setup.settings;
+        if settings.method != Method::Auto || settings.is_sliced() {
+            return false;
+        }
+        let Coupled { control, cuts, traffic, members, .. } = &self.flows.coupled;
+        if control.stiff && settings.scheduler == Scheduler::Auto && traffic.is_heavy(members.len()) {
+            return !self.setup.has_conditions || !members.iter().any(|id| self.needs_search(*id));
+        }
+        (control.stiff || *cuts < MAX_CUTS) && !self.searches_coupled()
+    }
+
+    /// True if an event of a member cannot be found from its formulas alone.
+    fn needs_search(&self, id: ModuleId) -> bool {
+        let Some(state) = self.world.state(id) else { return false };
+        let rule = state.rule.get().map(|rule| &self.setup.model.rules[rule]);
+        rule.is_some_and(|rule| needs_search(state, rule))
     }
 
     /// True if all integrated parameters of a coupled module have linear equations with constant coefficients.

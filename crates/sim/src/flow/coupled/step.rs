@@ -1,5 +1,6 @@
 //! The common step of the coupled modules, and the search for the next event of each member.
 
+use crate::Scheduler;
 use crate::detect::crossing::needs_search;
 use crate::detect::examined::{Conditions, ExaminedStep, Stages};
 use crate::detect::pulse::{MAX_UNBOUNDED, PulseFinding};
@@ -20,7 +21,6 @@ use crate::world::coupled_solution::CoupledSolution;
 use crate::world::path::Path;
 use crate::world::prefetch::prefetch;
 use crate::world::state::NextKind;
-use crate::{Method, Scheduler};
 use dlsys_model::Rule;
 use dlsys_tree::{ModuleId, SimTime};
 
@@ -101,7 +101,7 @@ impl FlowStage<'_, '_> {
     fn make_step(&mut self, from: SimTime, may_spare: bool) -> CommonStep {
         let rules = &self.setup.model.rules;
         let Coupled { traffic, members, integrator, reintegration, control, .. } = &mut self.flows.coupled;
-        let work = Work { common: integrator.evaluations(), regions: reintegration.evaluations() };
+        let work = Work { common: integrator.cost(), regions: reintegration.cost() };
         let longest = traffic.begin(from, members.len(), control.stiff.then_some(work));
         let limits = [self.setup.settings.slice_end(from), longest, self.world.resolved(from)];
         let limit = limits.into_iter().flatten().reduce(|a, b| if b < a { b } else { a });
@@ -313,8 +313,7 @@ impl FlowStage<'_, '_> {
             self.world.tree.set_value(of.place as usize, value);
         }
         system.advance(at);
-        let stiff = control.stiff && self.setup.settings.method == Method::Auto;
-        if stiff && !self.flows.coupled.tried && !self.searches_coupled() {
+        if control.stiff && !self.flows.coupled.tried && self.may_go_without_steps() {
             return self.restart_coupled(at);
         }
         self.step_coupled(at)

@@ -2,7 +2,7 @@
 
 use crate::flow::coupled::aggregates::{Partial, TermBatch};
 use crate::flow::coupled::algebra::Algebra;
-use crate::flow::coupled::lanes::LaneBatches;
+use crate::flow::coupled::lanes::{LaneBatches, ProgramKey};
 use crate::flow::coupled::rows::{
     ComponentPlace, EquationRow, EquationTable, FormulaInput, RowAggregate, VariableSource,
 };
@@ -28,6 +28,8 @@ pub struct System {
     pub terms: Vec<TermBatch>,
     /// The number of modules with equations.
     pub modules: u64,
+    /// All rates are linear, with constant coefficients, in all that moves.
+    pub is_linear: bool,
     /// The rates are there in batches only, the table has no rows.
     pub is_bare: bool,
     /// The same equations in sections, where several threads evaluate them: then `lanes` has none.
@@ -85,7 +87,7 @@ impl System {
         self.table.clear(start);
         self.lanes.clear();
         self.terms.clear();
-        (self.algebra, self.modules) = (Algebra::default(), 0);
+        (self.algebra, self.modules, self.is_linear) = (Algebra::default(), 0, false);
     }
 
     /// Derives the orders of evaluation from the table.
@@ -93,6 +95,16 @@ impl System {
         self.modules = self.table.rows.len() as u64;
         self.algebra = Algebra::new(&self.table, rules);
         self.table.batch_terms(&mut self.terms);
+        let is_linear = |row: &EquationRow| is_linear(rules, row.key());
+        self.is_linear = self.algebra.is_empty()
+            && self.table.aggregates.is_empty()
+            && self.table.rows.iter().all(is_linear);
+    }
+
+    /// True if nothing moves that the rates read, besides the components.
+    pub fn is_steady(&self) -> bool {
+        let EquationTable { inputs, formulas, timed, aged, .. } = &self.table;
+        !self.is_bare && !timed && !aged && inputs.is_empty() && formulas.is_empty()
     }
 
     /// Puts the rates into batches. Equations that are solved without steps need none.
@@ -298,6 +310,12 @@ impl EquationTable {
         let values = world.tree.values();
         places.map(|(i, place)| self.source(state, i, (values, || place), NONE, &unknown)).collect()
     }
+}
+
+/// True if the rates of a clause that are integrated are linear, with constant coefficients.
+fn is_linear(rules: &[Rule], key: ProgramKey) -> bool {
+    let clause = &rules[key.rule].solves[key.solve];
+    clause.linear.is_some() && (!key.numeric_only || clause.is_all_numeric())
 }
 
 /// The number of components of a clause that are integrated.

@@ -17,11 +17,17 @@ const EVENTS_A_STEP: f64 = 1.0;
 const FIRST: f64 = 4.0;
 const LEAST: f64 = 0.1;
 const MOST: f64 = 1e3;
+/// So many events tell what one of them takes.
+const SOME: usize = 16;
+/// What a solution without steps takes for a module, in evaluations of its equations.
+const ONE_SOLUTION: f64 = 10.0;
+/// Each instant takes a solution, also if something happens elsewhere only: more of all for each event of the tissue are too many.
+const INSTANTS: u64 = 2;
 /// The factors by which such a length changes.
 const SHORTER: f64 = 0.8;
 const LONGER: f64 = 1.25;
 
-/// Evaluations of the equations of one module so far.
+/// What steps have cost so far.
 #[derive(Clone, Copy, Default)]
 pub struct Work {
     /// In common steps.
@@ -39,10 +45,16 @@ pub struct Traffic {
     events: usize,
     /// Events a unit of time and module in the last step that had any.
     density: f64,
-    /// The work up to the start of the step.
-    work: Work,
+    /// The work up to the start of the step, once equations are stiff.
+    work: Option<Work>,
+    /// The work since then, and the events that it has answered.
+    all: (u64, usize),
     /// The length of steps at which both kinds of work are alike; 0 if nothing is known.
     balance: f64,
+    /// Solutions without steps have failed.
+    takes_steps: bool,
+    /// The number of the instant since which no steps have been made, and how often solutions have begun anew since.
+    rest: Option<(u64, u64)>,
 }
 
 impl Traffic {
@@ -59,8 +71,12 @@ impl Traffic {
             if passed > 0.0 {
                 self.density = events as f64 / (passed * members.max(1) as f64);
             }
+            if let (Some(before), Some(now)) = (self.work, work) {
+                self.all.0 += now.common - before.common + now.regions - before.regions;
+                self.all.1 += events;
+            }
         }
-        self.start = Some(at);
+        (self.start, self.rest) = (Some(at), None);
         let mut longest = EVENTS_A_STEP / self.density;
         if let Some(work) = work {
             longest = longest.min(self.balanced(work, members));
@@ -68,9 +84,29 @@ impl Traffic {
         longest.is_finite().then(|| at.after(longest))
     }
 
+    /// True if events have been seen to take more work in stiff equations than a solution without steps, for so many modules at
+    /// each of them.
+    pub fn is_heavy(&self, members: usize) -> bool {
+        let (work, events) = self.all;
+        !self.takes_steps && events >= SOME && work as f64 >= ONE_SOLUTION * (members * events) as f64
+    }
+
+    /// Notes that no step is made from the instant of this number on.
+    pub fn pause(&mut self, instant: u64) {
+        (self.start, self.events) = (None, 0);
+        let (first, solutions) = self.rest.get_or_insert((instant, 0));
+        self.takes_steps |= instant - *first > INSTANTS * *solutions + SOME as u64;
+        *solutions += 1;
+    }
+
+    /// Notes that a solution without steps has failed.
+    pub fn take_steps(&mut self) {
+        self.takes_steps = true;
+    }
+
     /// The length of the next step at which regions take as much work as common steps.
     fn balanced(&mut self, work: Work, members: usize) -> f64 {
-        let last = std::mem::replace(&mut self.work, work);
+        let last = self.work.replace(work).unwrap_or_default();
         let (common, regions) = (work.common - last.common, work.regions - last.regions);
         let interval = 1.0 / (self.density * members.max(1) as f64);
         if !interval.is_finite() {
@@ -80,5 +116,35 @@ impl Traffic {
         let length = if self.balance > 0.0 { self.balance * factor } else { FIRST * interval };
         self.balance = length.clamp(LEAST * interval, MOST * interval);
         self.balance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Traffic after `events` events in a step that took so much work.
+    fn after(events: usize, work: u64) -> Traffic {
+        let mut traffic = Traffic::default();
+        traffic.begin(SimTime::ZERO, 100, Some(Work { common: 7, regions: 0 }));
+        (0..events).for_each(|_| traffic.note_event());
+        traffic.begin(SimTime::new(1.0), 100, Some(Work { common: 7 + work, regions: 0 }));
+        traffic
+    }
+
+    #[test]
+    fn events_are_heavy_that_take_more_than_a_solution_for_all() {
+        assert!(after(20, 20_000).is_heavy(100) && !after(20, 20_000).is_heavy(101));
+        assert!(!after(20, 19_999).is_heavy(100) && !after(15, 100_000).is_heavy(100));
+    }
+
+    #[test]
+    fn a_tissue_that_little_happens_to_takes_steps() {
+        let mut traffic = after(20, 20_000);
+        // One instant elsewhere for each of its own, then two.
+        (0..1000).for_each(|event| traffic.pause(2 * event));
+        assert!(traffic.is_heavy(100));
+        (0..1000).for_each(|event| traffic.pause(2000 + 3 * event));
+        assert!(!traffic.is_heavy(100));
     }
 }

@@ -137,6 +137,11 @@ impl Linear {
         if poles_first { None } else { self.by_poles(tau) }
     }
 
+    /// True if no other method was good enough for some time.
+    pub fn has_taken_steps(&self) -> bool {
+        self.steps.is_some()
+    }
+
     fn series(&mut self) -> &mut Series {
         self.series.get_or_insert_with(|| Series::new(&self.problem))
     }

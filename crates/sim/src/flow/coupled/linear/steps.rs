@@ -84,6 +84,14 @@ impl Rates for LinearRates<'_> {
         out.extend(self.problem.entries.iter().map(|e| e.2));
     }
 
+    fn is_linear(&self) -> bool {
+        true
+    }
+
+    fn is_steady(&self) -> bool {
+        true
+    }
+
     fn modules(&self) -> u64 {
         self.problem.y.len() as u64
     }
