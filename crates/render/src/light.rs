@@ -138,7 +138,9 @@ mod tests {
     #[test]
     fn light_that_comes_through_a_leaf_is_a_part_of_that_on_its_other_side() {
         let light = Light::new([-5.0, 5.0], 10.0, false);
-        let of = |x: f64, y: f64, z: f64, is_thin: bool| light.of_normal(Vector::new(x, y, z).normalize(), is_thin);
+        let of = |x: f64, y: f64, z: f64, is_thin: bool| {
+            light.of_normal(Vector::new(x, y, z).normalize(), is_thin)
+        };
         // The underside of a petal that opens upwards and is seen from a little below, and a leaf that hangs towards the viewer.
         for (x, y, z) in [(0.0, -0.9, 0.4), (0.0, -1.0, 0.1), (0.4, -0.8, 0.5)] {
             let (above, below, opaque) = (of(-x, -y, -z, true), of(x, y, z, true), of(x, y, z, false));
