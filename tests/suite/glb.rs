@@ -167,7 +167,7 @@ fn positions_are_within_the_accuracy_between_frames_too() {
 #[test]
 #[ignore = "slow"]
 fn all_models_are_within_the_accuracy_at_many_times() {
-    const ALL: [(&str, [f64; 3]); 11] = [
+    const ALL: [(&str, [f64; 3]); 12] = [
         ("anabaena.dls", [200.0, 575.0, 1.0]),
         ("birch.dls", [0.0, 14.0, 0.1]),
         ("campanula.dls", [0.0, 20.0, 0.04]),
