@@ -435,6 +435,9 @@ fn a_coloured_floor_fades_into_the_horizon_in_svg_as_in_png() {
     let of_floor: Vec<String> = floor.lines().filter_map(outline).collect();
     let copies: Vec<String> = copies.lines().filter_map(outline).collect();
     assert!(!copies.is_empty() && copies.iter().all(|copy| of_floor.contains(copy)));
+    // Without perspective there is no horizon.
+    let text = "ground 0 color \"#7f9a4e\"\ninitial string: !(0.2) F(3)\n";
+    std::fs::write(&model, text).expect("a model");
     let flat = String::from_utf8(drawn("svg", &[])).expect("UTF-8");
-    assert!(!flat.contains("mask"), "there is no horizon without perspective");
+    assert!(flat.contains("<path") && !flat.contains("mask"));
 }
