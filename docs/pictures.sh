@@ -18,9 +18,9 @@ portrait="--size 540x600 --perspective 25"
 # shellcheck disable=SC2086
 {
     picture readme-lychnis frame-0000 lychnis --at 6.6 --view 25,12 $portrait
-    picture readme-poppy frame-0000 poppy --at 4.4 --view 25,28 $portrait
+    picture readme-poppy frame-0000 poppy --at 13.3 --view 155,26 $portrait
     picture readme-pappus frame-0000 hieracium --set n_0=0 --set t_h=8 --set x_th=20 --at 26 --view 0,20 $portrait
-    picture readme-sapling frame-0000 sapling --at 14 --view 20,8 $portrait
+    picture readme-sapling frame-0000 sapling --at 16 --view 20,8 $portrait
 }
 picture readme-meadow frame-0000 meadow --at 1 --size 1200x560
 picture campanula grid campanula --from 7 --to 17 --step 1 --layout grid --accuracy 0.02 --width 1000

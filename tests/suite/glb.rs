@@ -167,7 +167,7 @@ fn positions_are_within_the_accuracy_between_frames_too() {
 #[test]
 #[ignore = "slow"]
 fn all_models_are_within_the_accuracy_at_many_times() {
-    const ALL: [(&str, [f64; 3]); 11] = [
+    const ALL: [(&str, [f64; 3]); 12] = [
         ("anabaena.dls", [200.0, 575.0, 1.0]),
         ("birch.dls", [0.0, 14.0, 0.1]),
         ("campanula.dls", [0.0, 20.0, 0.04]),
@@ -177,8 +177,9 @@ fn all_models_are_within_the_accuracy_at_many_times() {
         ("leaf.dls", [0.0, 9.0, 0.05]),
         ("lychnis.dls", [0.0, 8.0, 0.02]),
         ("petal.dls", [0.0, 7.0, 0.05]),
-        ("poppy.dls", [0.0, 12.0, 0.05]),
-        ("sapling.dls", [0.0, 14.0, 0.1]),
+        ("poppy.dls", [0.0, 26.0, 0.1]),
+        ("sapling.dls", [0.0, 16.0, 0.1]),
+        ("wilting.dls", [0.0, 12.0, 0.05]),
     ];
     for (name, [from, to, step]) in ALL {
         let followed = follow(model(name), [from, to, step], 2);

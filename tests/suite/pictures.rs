@@ -402,3 +402,42 @@ fn one_picture_is_a_file() {
     let count = std::fs::read_dir(folder.path()).expect("a folder").count();
     assert_eq!(count, 6, "nothing is left over");
 }
+
+#[test]
+fn a_coloured_floor_fades_into_the_horizon_in_svg_as_in_png() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let model = folder.path().join("post.dls");
+    let text = "ground 0 color \"#7f9a4e\"\nsky \"#5f95cf\", \"#e6e9dc\"\ninitial string: !(0.2) F(3)\n";
+    std::fs::write(&model, text).expect("a model");
+    let drawn = |format: &str, view: &[&str]| {
+        let out = folder.path().join(format).join(view.len().to_string());
+        let [out_name, model] = [&out, &model].map(|path| path.to_str().expect("UTF-8"));
+        let flags = [
+            "render", "--quiet", "--force", "--at", "0", "--view", "20,8", "--size", "300x240", "--format",
+            format,
+        ];
+        good(&[&flags[..], view, &["-o", out_name, model]].concat());
+        std::fs::read(out.join(format!("frame-0000.{format}"))).expect("a frame")
+    };
+    let picture = Picture::read(&drawn("png", &["--perspective", "40"]));
+    let greens: Vec<i32> =
+        (0..240).map(|y| i32::from(picture.at(2, y)[1]) - i32::from(picture.at(2, y)[2])).collect();
+    assert!(greens.windows(2).all(|rows| rows[0].abs_diff(rows[1]) <= 6), "no edge: {greens:?}");
+    assert!(greens[239] > 50 && greens[239] > greens[120] + 20, "{greens:?}");
+
+    let svg = String::from_utf8(drawn("svg", &["--perspective", "40"])).expect("UTF-8");
+    assert!(usvg::Tree::from_str(&svg, &usvg::Options::default()).is_ok());
+    let (copies, floor) = svg.split_once("<g mask=\"url(#near)\">").expect("a floor with a mask");
+    let (_, copies) =
+        copies.split_once("<g fill=\"#e6e9dc\">").expect("copies that have the colour of the horizon");
+    let outline =
+        |line: &str| line.split_once(" d=\"").map(|(_, data)| data.trim_end_matches("\"/>").to_owned());
+    let of_floor: Vec<String> = floor.lines().filter_map(outline).collect();
+    let copies: Vec<String> = copies.lines().filter_map(outline).collect();
+    assert!(!copies.is_empty() && copies.iter().all(|copy| of_floor.contains(copy)));
+    // Without perspective there is no horizon.
+    let text = "ground 0 color \"#7f9a4e\"\ninitial string: !(0.2) F(3)\n";
+    std::fs::write(&model, text).expect("a model");
+    let flat = String::from_utf8(drawn("svg", &[])).expect("UTF-8");
+    assert!(flat.contains("<path") && !flat.contains("mask"));
+}

@@ -131,7 +131,7 @@ fn events_are_visited_one_by_one() {
 #[test]
 fn events_are_known_before_they_are_seen() {
     let models =
-        ["models/poppy.dls", "models/birch.dls", "models/abop/bush.dls", "tests/paper-models/anabaena.dls"];
+        ["models/wilting.dls", "models/birch.dls", "models/abop/bush.dls", "tests/paper-models/anabaena.dls"];
     let read = |name: &str| std::fs::read_to_string(repository(name)).expect("there");
     // Cuts change more than the module that is replaced; the last two are events of one instant, but for rounding.
     let cut = "initial string: A(0) B(1) A(0.5) [ B(2) ] B(3)

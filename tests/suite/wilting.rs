@@ -1,5 +1,5 @@
 //! The stalk of `models/scenes/wilt.dls` against the heavy elastica, the exact shape of a thin rod under its weight and a load, and against the
-//! same mechanics in rules, `models/poppy.dls`.
+//! same mechanics in rules, `models/wilting.dls`.
 
 use dlsys::session::{Nursery, Session};
 use dlsys::sim::Settings;
@@ -52,15 +52,15 @@ fn a_wilted_stalk_hangs_over_as_the_elastica() {
     assert!(error < 0.01, "{found:?} instead of {:?}", [aside, high]);
 }
 
-/// Where the tip of the stalk of `models/poppy.dls` is, with so many pieces, at some times: aside and up, in lengths of the stalk.
+/// Where the tip of the stalk of `models/wilting.dls` is, with so many pieces, at some times: aside and up, in lengths of the stalk.
 fn by_rules(pieces: usize, times: &[f64]) -> Vec<[f64; 2]> {
-    let text = std::fs::read_to_string(repository("models/poppy.dls")).expect("a model");
+    let text = std::fs::read_to_string(repository("models/wilting.dls")).expect("a model");
     let piece = "S(0, 0, 0, 0, 0, 0, 0, 0, 0)";
     assert_eq!(text.matches(piece).count(), 11, "a base and eleven pieces");
     let text = text.replace(piece, "").replace("const n = 12 ", &format!("const n = {pieces} "));
     let text = text.replace("const m_S = 0.003 ", &format!("const m_S = {} ", 0.036 / pieces as f64));
     let text = text.replace("  R(0, 0,", &format!("  {}  R(0, 0,", format!("{piece} ").repeat(pieces - 1)));
-    let session = Session::from_text("poppy.dls", &text, &[]).expect("a good model");
+    let session = Session::from_text("wilting.dls", &text, &[]).expect("a good model");
     let kind = session.model.kinds.iter().find(|(_, kind)| kind.name == "R").expect("the receptacle").0;
     let mut simulation = session.simulate(Settings::default()).expect("it starts");
     let at = |time: &f64| {
@@ -72,7 +72,7 @@ fn by_rules(pieces: usize, times: &[f64]) -> Vec<[f64; 2]> {
     times.iter().map(at).collect()
 }
 
-/// The solver and the rules of `models/poppy.dls` are two ways to one motion.
+/// The solver and the rules of `models/wilting.dls` are two ways to one motion.
 #[test]
 fn a_poppy_wilts_as_its_rules_say() {
     let times: Vec<f64> = (1..=48).map(|k| f64::from(k) * 0.25).collect();

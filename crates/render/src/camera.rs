@@ -146,11 +146,15 @@ impl Camera {
         Point::from(self.view.space(seen.coords))
     }
 
+    /// The ray of sight to this height of the picture, in its middle, up to the plane of focus; `None` without perspective.
+    pub(super) fn sight(&self, y: f64) -> Option<Vector> {
+        let eye = self.eye.as_ref()?;
+        Some(self.view.space(Vector::new(0.0, y - eye.y, -eye.distance)))
+    }
+
     /// Sine of the elevation above the horizon of what is seen at this height of the picture, in its middle; `None` without perspective.
     pub(super) fn elevation(&self, y: f64) -> Option<f64> {
-        let eye = self.eye.as_ref()?;
-        let seen = self.view.space(Vector::new(0.0, y - eye.y, -eye.distance));
-        Some(seen.y / seen.norm())
+        self.sight(y).map(|seen| seen.y / seen.norm())
     }
 
     /// The direction from the scene to the viewer.

@@ -33,6 +33,7 @@ pub struct Survey {
     turns: bool,
     /// There are pictures on surfaces, or ground that gives way: these are seen as they are also where plants have no depth, or nothing is drawn.
     has_solids: bool,
+    pub(super) has_soil: bool,
     /// A sun, a sky or a floor is declared: what has no depth is no diagram then, but stands in that light.
     is_lit: bool,
     /// The surroundings of the first frame.
@@ -55,6 +56,7 @@ impl Survey {
             has_camera: false,
             turns: false,
             has_solids: false,
+            has_soil: false,
             is_lit: false,
             first: None,
         }
@@ -101,6 +103,7 @@ impl Survey {
         self.seen.merge(&if self.turns { Extent::profile(scene) } else { Extent::of(scene, &self.view) });
         self.is_lit |= around.sun.is_some() || around.sky.is_some() || around.floor.is_some();
         self.has_solids |= scene.palette.has_textures() || scene.terrain.is_some();
+        self.has_soil |= scene.terrain.is_some();
         self.crowd.merge(Crowd::of(scene));
     }
 
@@ -110,6 +113,7 @@ impl Survey {
         self.crowd.merge(other.crowd);
         self.has_camera |= other.has_camera;
         self.has_solids |= other.has_solids;
+        self.has_soil |= other.has_soil;
         self.is_lit |= other.is_lit;
         if self.first.is_none() {
             self.first.clone_from(&other.first);

@@ -3,7 +3,7 @@
 //! All frames have one scale and one camera; a sheet only moves their pictures.
 
 use super::lighting::floor_color;
-use super::{Fit, Picture, Survey};
+use super::{Fit, Page, Picture, Size, Survey};
 use dlsys_geometry::scene::{Color, Point};
 
 /// How the frames of an animation are put on pictures.
@@ -41,6 +41,8 @@ pub struct Spacing {
     pub columns: Option<usize>,
     /// From one line of a stack to the next, in scene units; `None`: the height of the highest.
     pub row_height: Option<f64>,
+    /// Of the whole sheet: captions of a grid are large enough to be read.
+    pub size: Size,
 }
 
 /// The place of a frame on a sheet. Coordinates are those that the camera sees, to the right and up.
@@ -76,6 +78,10 @@ pub struct Sheet {
     pub(super) lines: bool,
     /// The floor that all frames stand on, and its colour if that is not the one of the background.
     pub(super) floor: Option<Option<Color>>,
+    /// Whether frames are pieces of one ground of soil.
+    pub(super) has_soil: bool,
+    /// Whether captions were left out, because the sheet has no room for letters that can be read.
+    pub lacks_captions: bool,
 }
 
 /// Opacity of the oldest frame of an overlay. The last one has 1.
@@ -89,6 +95,11 @@ const LETTERS: f64 = 0.02;
 const LINE: f64 = 1.6;
 /// Width of a letter, in sizes of letters, and the space between captions.
 const LETTER_WIDTH: f64 = 0.55;
+/// Letters that can be read, in pixels, and how much larger a sheet may become by them.
+const READABLE: f64 = 9.0;
+const LARGER: f64 = 1.6;
+/// How far a piece of soil reaches beyond what is drawn on it in any frame, in parts of the larger side of that.
+const SOIL_RIM: f64 = 0.15;
 
 impl Sheet {
     /// Frames on a sheet, each as a survey of it; `captions` are the texts below them in a grid, none if empty.
@@ -104,9 +115,17 @@ impl Sheet {
                     Some(_) => frames.iter().map(|survey| fit.shaded_frame_of(survey)).collect(),
                     None => seen,
                 };
+                // Soil has traces of what is not there any more, so all frames show the same piece of it.
+                let has_soil = frames.iter().any(|survey| survey.has_soil);
+                let soil = union(seen.iter().flatten().copied()).filter(|_| has_soil).map(
+                    |[left, bottom, right, top]| {
+                        let rim = SOIL_RIM * (right - left).max(top - bottom);
+                        [left - rim, bottom - rim, right + rim, top + rim]
+                    },
+                );
+                let seen = if soil.is_some() { vec![soil; seen.len()] } else { seen };
                 let ground = fit.camera.project(Point::origin()).y;
-                let columns = spacing.columns.unwrap_or(seen.len()).max(1);
-                Sheet { floor, ..grid(&seen, ground, captions, columns) }
+                Sheet { floor, has_soil, ..readable(&seen, ground, captions, spacing) }
             }
         }
     }
@@ -129,7 +148,16 @@ fn overlay(layout: Layout, fit: &Fit, seen: &[Option<[f64; 4]>]) -> Sheet {
         let age = (seen.len() - 1 - i) as f64 / last;
         Cell { offset: [0.0; 2], frame, opacity: 1.0 - (1.0 - FAINTEST) * age, caption: None }
     });
-    Sheet { layout, picture: fit.picture, cells: cells.collect(), letters: 0.0, lines: false, floor: None }
+    Sheet {
+        layout,
+        picture: fit.picture,
+        cells: cells.collect(),
+        letters: 0.0,
+        lines: false,
+        floor: None,
+        has_soil: false,
+        lacks_captions: false,
+    }
 }
 
 fn stack(seen: &[Option<[f64; 4]>], row_height: Option<f64>) -> Sheet {
@@ -154,10 +182,45 @@ fn stack(seen: &[Option<[f64; 4]>], row_height: Option<f64>) -> Sheet {
         })
         .collect();
     let all = union(cells.iter().filter_map(|cell| cell.frame));
-    Sheet { layout: Layout::Stack, picture: Picture::around(all), cells, letters: 0.0, lines, floor: None }
+    Sheet {
+        layout: Layout::Stack,
+        picture: Picture::around(all),
+        cells,
+        letters: 0.0,
+        lines,
+        floor: None,
+        has_soil: false,
+        lacks_captions: false,
+    }
 }
 
-fn grid(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], columns: usize) -> Sheet {
+/// A grid whose captions can be read at its size: whole, or at least what stands behind the last space of each, the number; or none.
+fn readable(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], spacing: Spacing) -> Sheet {
+    /// Larger letters make a larger sheet, on which they have to be larger again.
+    const TRIALS: usize = 20;
+    let columns = spacing.columns.unwrap_or(seen.len()).max(1);
+    let bare = grid(seen, ground, &[], columns, 0.0);
+    let pixel = |sheet: &Sheet| {
+        Page::new(sheet.picture, spacing.size, None).map_or(0.0, |page| 1.0 / page.pixels_per_unit())
+    };
+    let numbers = || captions.iter().map(|text| text.rsplit(' ').next().unwrap_or(text).to_owned()).collect();
+    for captions in [captions.to_vec(), numbers()] {
+        let mut sheet = grid(seen, ground, &captions, columns, 0.0);
+        for _ in 0..TRIALS {
+            if captions.is_empty() || sheet.letters >= 0.99 * READABLE * pixel(&sheet) {
+                return sheet;
+            }
+            sheet = grid(seen, ground, &captions, columns, READABLE * pixel(&sheet));
+            if pixel(&sheet) > LARGER * pixel(&bare) {
+                break;
+            }
+        }
+    }
+    Sheet { lacks_captions: true, ..bare }
+}
+
+/// Letters have the usual size, but at least this one, in scene units.
+fn grid(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], columns: usize, least: f64) -> Sheet {
     let frames: Vec<[f64; 4]> = seen.iter().map(|f| f.unwrap_or([0.0, ground, 0.0, ground])).collect();
     let columns = columns.min(frames.len().max(1));
     let width_of = |i: usize| frames[i][2] - frames[i][0];
@@ -167,7 +230,7 @@ fn grid(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], columns: us
     let gap = GAP * widths.iter().copied().fold(0.0, f64::max);
     let across = widths.iter().sum::<f64>() + gap * (columns - 1) as f64;
     let down: f64 = rows.iter().map(|row| row.above + row.below).sum();
-    let letters = if captions.is_empty() { 0.0 } else { LETTERS * across.max(down) };
+    let letters = if captions.is_empty() { 0.0 } else { least.max(LETTERS * across.max(down)) };
     for (i, caption) in captions.iter().enumerate() {
         let width = &mut widths[i % columns];
         *width = width.max(letters * LETTER_WIDTH * (caption.chars().count() + 1) as f64);
@@ -198,6 +261,8 @@ fn grid(seen: &[Option<[f64; 4]>], ground: f64, captions: &[String], columns: us
         letters,
         lines: false,
         floor: None,
+        has_soil: false,
+        lacks_captions: false,
     }
 }
 
@@ -247,7 +312,7 @@ mod tests {
     #[test]
     fn a_grid_stands_on_the_ground() {
         let captions: Vec<String> = ["a", "b", "c"].map(str::to_owned).into();
-        let sheet = grid(&[SMALL, LARGE, SMALL], 0.0, &captions, 2);
+        let sheet = grid(&[SMALL, LARGE, SMALL], 0.0, &captions, 2, 0.0);
         let [a, b, c] = &sheet.cells[..] else { panic!("three") };
         assert_eq!(a.offset[1], b.offset[1], "one ground");
         assert!(c.offset[1] < a.offset[1] - 3.0, "the next row is below");
@@ -256,16 +321,49 @@ mod tests {
         let caption = b.caption.as_ref().expect("a caption");
         assert!(caption.y < right[1] && caption.y > c.frame.expect("drawn")[3], "below its own frame");
         assert!((caption.x - (right[0] + right[2]) / 2.0).abs() < 1e-12);
-        let one_row = grid(&[SMALL, None, LARGE], 0.0, &[], 3);
+        let one_row = grid(&[SMALL, None, LARGE], 0.0, &[], 3, 0.0);
         assert!(one_row.cells.iter().all(|cell| cell.offset[1] == one_row.cells[0].offset[1]));
         assert_eq!(one_row.letters, 0.0);
     }
 
     #[test]
+    fn captions_can_be_read_or_are_left_out() {
+        let captions: Vec<String> = (0..6).map(|i| format!("t = {i}.25")).collect();
+        let seen = [SMALL; 6];
+        let of = |pixels: u32| {
+            readable(&seen, 0.0, &captions, Spacing { size: Size::Width(pixels), ..Spacing::default() })
+        };
+        let pixels = |sheet: &Sheet, width: u32| {
+            let page = Page::new(sheet.picture, Size::Width(width), None).expect("a page");
+            sheet.letters * page.pixels_per_unit()
+        };
+        let large = of(1000);
+        assert_eq!(large.letters, grid(&seen, 0.0, &captions, 6, 0.0).letters, "as usual");
+        let small = of(300);
+        assert!((8.9..9.5).contains(&pixels(&small, 300)), "{}", pixels(&small, 300));
+        assert!(small.cells.iter().all(|cell| cell.caption.is_some()) && !small.lacks_captions);
+        let words = |sheet: &Sheet| sheet.cells[1].caption.as_ref().map(|caption| caption.text.clone());
+        assert_eq!(
+            [words(&large), words(&small)],
+            ["t = 1.25", "t = 1.25"].map(|text| Some(text.to_owned()))
+        );
+        assert_eq!(words(&of(200)).as_deref(), Some("1.25"), "not more than there is room for");
+        let tiny = of(80);
+        assert!(tiny.lacks_captions && tiny.cells.iter().all(|cell| cell.caption.is_none()));
+        assert!(
+            !readable(&seen, 0.0, &[], Spacing { size: Size::Width(100), ..Spacing::default() })
+                .lacks_captions
+        );
+    }
+
+    #[test]
     fn nothing_is_a_sheet_too() {
-        for sheet in
-            [stack(&[], None), stack(&[None], None), grid(&[], 0.0, &[], 1), grid(&[None], 0.0, &[], 1)]
-        {
+        for sheet in [
+            stack(&[], None),
+            stack(&[None], None),
+            grid(&[], 0.0, &[], 1, 0.0),
+            grid(&[None], 0.0, &[], 1, 0.0),
+        ] {
             assert!(sheet.picture.area[2] > 0.0 && sheet.picture.area[3] > 0.0);
         }
     }

@@ -13,7 +13,7 @@ pub(super) const LAMP: Vector = Vector::new(-0.36, 0.583, 0.728_361_861);
 const DIFFUSE: f64 = 0.48;
 /// How far the lamp's light reaches around a surface, as that of a wide lamp: the cosine beyond a right angle.
 const WRAP: f64 = 0.25;
-/// The part of the light on the other side of a leaf that comes through.
+/// The part that comes through a leaf of what the other side has more of the light.
 pub(super) const TRANSMITTED: f64 = 0.55;
 /// One over the length of the sum of the unit vectors to the lamp and to the viewer.
 const HALF: f64 = 0.537_858_04;
@@ -86,11 +86,13 @@ impl Light {
         // Half-way between the lamp and the viewer.
         let half = Vector::new(LAMP.x, LAMP.y, LAMP.z + 1.0) * HALF;
         let gloss = normal.dot(&half).max(0.0).powi(SHARPNESS) - half.z.powi(SHARPNESS);
-        let cos = normal.dot(&LAMP);
         let around = |cos: f64| ((cos + WRAP) / (1.0 + WRAP)).max(0.0);
-        let through = if is_thin { TRANSMITTED * (-cos).max(0.0) } else { 0.0 };
-        let diffuse = around(cos) - around(LAMP.z) + through;
-        self.relief * (DIFFUSE * diffuse + ABOVE * normal.y + GLOSS * gloss)
+        let on_side = |cos: f64, up: f64| DIFFUSE * (around(cos) - around(LAMP.z)) + ABOVE * up;
+        let cos = normal.dot(&LAMP);
+        let lit = on_side(cos, normal.y);
+        // All that lights the other side comes through, the light from above as well as the lamp's.
+        let more = if is_thin { (on_side(-cos, -normal.y) - lit).max(0.0) } else { 0.0 };
+        self.relief * (lit + TRANSMITTED * more + GLOSS * gloss)
     }
 
     /// The part that is left at a depth.
@@ -131,6 +133,21 @@ mod tests {
         assert!(light.is_flat());
         assert_eq!(light.strength(LAMP, 0.0), 1.0);
         assert_eq!(light.across([Vector::x(), Vector::z()], 0.0, [-1.0, 0.0, 1.0]), [1.0; 3]);
+    }
+
+    #[test]
+    fn light_that_comes_through_a_leaf_is_a_part_of_that_on_its_other_side() {
+        let light = Light::new([-5.0, 5.0], 10.0, false);
+        let of = |x: f64, y: f64, z: f64, is_thin: bool| {
+            light.of_normal(Vector::new(x, y, z).normalize(), is_thin)
+        };
+        // The underside of a petal that opens upwards and is seen from a little below, and a leaf that hangs towards the viewer.
+        for (x, y, z) in [(0.0, -0.9, 0.4), (0.0, -1.0, 0.1), (0.4, -0.8, 0.5)] {
+            let (above, below, opaque) = (of(-x, -y, -z, true), of(x, y, z, true), of(x, y, z, false));
+            assert!(opaque + 0.08 < below && below < above, "{opaque} {below} {above}");
+        }
+        // The lit side is that of a stem.
+        assert_eq!(of(-0.2, 0.9, 0.4, true), of(-0.2, 0.9, 0.4, false));
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! sun. So pictures of pixels and of regions have the same shading.
 
 use super::casters::Casters;
+use super::floor::Fading;
 use super::haze::{self, Haze};
 use super::lens::Lens;
 use super::light::{GLOSS, Light, SHARPNESS, Spot, TRANSMITTED};
@@ -64,6 +65,7 @@ pub(super) struct Lighting<'a> {
     open_sky: Option<OpenSky>,
     /// The colour of the floor, if it has one of its own.
     ground: Option<Color>,
+    fading: Option<Fading>,
     haze: Option<Haze>,
 }
 
@@ -107,6 +109,7 @@ impl<'a> Lighting<'a> {
             Some(maps)
         });
         let ground = floor_color(&around);
+        let fading = floor.filter(|_| ground.is_some()).and_then(|height| Fading::new(fit, height));
         let maps = maps.flatten();
         let visible = |at: &Vector| match (&maps, sun) {
             (Some(maps), Some(sun)) => maps.sun(*at, sun),
@@ -119,7 +122,12 @@ impl<'a> Lighting<'a> {
             visible: &visible,
         };
         let haze = Haze::new(scene, fit.camera, &around, threads);
-        Lighting { fit, declared, maps, floor, open_sky, ground, haze }
+        Lighting { fit, declared, maps, floor, open_sky, ground, fading, haze }
+    }
+
+    /// How the floor fades into the horizon, if it does.
+    pub(super) fn fading(&self) -> Option<&Fading> {
+        self.fading.as_ref()
     }
 
     /// The gases in front of what is seen.
@@ -250,7 +258,8 @@ impl<'a> Lighting<'a> {
         match self.ground {
             Some(ground) => {
                 let Color { red, green, blue } = self.color(ground, strength);
-                [red, green, blue, 255]
+                let left = self.fading.map_or(1.0, |fading| fading.left(self.fit.camera.unproject(seen)));
+                [red, green, blue, 255].map(|c| (f64::from(c) * left + 0.5) as u8)
             }
             None => {
                 let opacity = (1.0 - strength) * 255.0;

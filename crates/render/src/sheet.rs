@@ -105,10 +105,10 @@ impl SheetWriter {
         Ok(painter::elements(&scene, painter::Style { floor, ..style }, false, prefix))
     }
 
-    /// The fit of a frame: of one that stands on the floor of the sheet, its part of that.
+    /// The fit of a frame: of one that stands on the floor of the sheet or on soil, its part of that.
     fn fit_of(&self, cell: Option<&Cell>) -> Cow<'_, Fit> {
         let part = cell.and_then(|cell| cell.frame.zip(Some(cell.offset)));
-        match part.filter(|_| self.sheet.floor.is_some()) {
+        match part.filter(|_| self.sheet.floor.is_some() || self.sheet.has_soil) {
             None => Cow::Borrowed(&self.fit),
             Some(([left, bottom, right, top], [x, y])) => {
                 Cow::Owned(self.fit.for_cell([left - x, bottom - y, right - x, top - y]))

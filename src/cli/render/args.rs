@@ -67,7 +67,8 @@ pub struct RenderArgs {
     /// With --layout grid: frames in a row [default: all in one]
     #[arg(long, value_name = "N", value_parser = columns)]
     pub columns: Option<usize>,
-    /// With --layout grid: do not write the time below each frame
+    /// With --layout grid: do not write the time below each frame. It has letters of at least 9
+    /// pixels; on small sheets it is a number alone
     #[arg(long)]
     pub no_captions: bool,
     /// With --layout stack: from one line to the next, in scene units [default: the height of the highest]

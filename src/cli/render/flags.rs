@@ -190,7 +190,7 @@ pub fn threads(args: &RenderArgs) -> usize {
 }
 
 pub fn spacing(args: &RenderArgs) -> Spacing {
-    Spacing { columns: args.columns, row_height: args.row_height }
+    Spacing { columns: args.columns, row_height: args.row_height, size: size(args) }
 }
 
 /// The values that all frames share; `picture` is the area of the page.
@@ -253,11 +253,14 @@ pub fn detail(args: &RenderArgs, format: Format) -> Option<Detail> {
 
 /// The page for a picture.
 pub fn page(args: &RenderArgs, picture: Picture) -> Result<Page, Failure> {
-    let size = match (args.size, args.width) {
+    let background = args.background.map_or(Some(Page::BACKGROUND), |Background(color)| color);
+    Page::new(picture, size(args), background).map_err(usage)
+}
+
+fn size(args: &RenderArgs) -> Size {
+    match (args.size, args.width) {
         (Some((width, height)), _) => Size::Exact(width, height),
         (None, Some(width)) => Size::Width(width),
         (None, None) => Size::default(),
-    };
-    let background = args.background.map_or(Some(Page::BACKGROUND), |Background(color)| color);
-    Page::new(picture, size, background).map_err(usage)
+    }
 }

@@ -24,7 +24,7 @@ use serde_json::json;
 
 use super::album::{Album, Keeping};
 use super::args::RenderArgs;
-use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of};
+use super::common::{Clock, Failure, ModelRun, count_of, out_error, size_of, tell};
 use super::events::EventLog;
 use super::export;
 use super::frame_source::{Frame, Pass, play, play_at};
@@ -369,6 +369,11 @@ impl Render<'_> {
         let times = &self.run.times;
         let sheet = sheet(self.args, self.run, &self.frames, &fit);
         let page = flags::page(self.args, sheet.picture)?;
+        if sheet.lacks_captions {
+            tell(
+                "warning: the times below the frames are left out: there is no room for letters that can be read; choose a larger --width, fewer --columns, or --no-captions\n",
+            );
+        }
         let refuse = |error: render::Error| Failure::Usage(format!("error: {error}\n"));
         let writer = SheetWriter::new(self.format, fit.clone(), sheet, page).map_err(refuse)?;
         let mut directory = FrameDirectory::create(self.out, self.args.force)

@@ -3,6 +3,7 @@
 
 in vec3 at;
 in float open;
+in float beyond;
 
 // The colour under a declared sky; its first number is negative without one.
 uniform vec3 earth;
@@ -35,5 +36,7 @@ void main() {
     strength = (1.0 - POOL * exp(-dot(away, away))) * min(strength, 1.0);
     // As the drawing gains depth.
     strength = 1.0 + relief * (strength - 1.0);
-    painted = earth.r >= 0.0 ? vec4(lit(earth, strength, tint), 1.0) : vec4(lit(vec3(1.0), 0.0, vec3(-1.0)), 1.0) * (1.0 - strength);
+    // A floor of a colour fades into the horizon.
+    float away_by = max(beyond, 0.0), left = 1.0 / (1.0 + away_by * away_by);
+    painted = earth.r >= 0.0 ? vec4(lit(earth, strength, tint), 1.0) * left : vec4(lit(vec3(1.0), 0.0, vec3(-1.0)), 1.0) * (1.0 - strength);
 }

@@ -7,16 +7,33 @@ uniform mat4 view;
 uniform mat4 projection;
 uniform float height;
 uniform float around;
+uniform float extent;
 
 out vec3 at;
 // The part of the sky that is seen.
 out float open;
+// How far it is beyond the place where the floor begins to fade, in parts of the distance within which half of its colour goes; not positive: not at all.
+out float beyond;
 
 // How wide it is smoothed, in parts of how far shadows of the sky reach.
 const float ASIDE = 0.06;
+// As crates/render/src/floor.rs has them, in parts of the extent.
+const float FADES_BEHIND = 0.5;
+const float FADES_WITHIN = 2.0;
+
+// Along the horizontal direction of sight; there is no horizon without perspective, or from above.
+float beyond_plant() {
+    vec3 up = view[1].xyz, ahead = up * up.z - vec3(0.0, 0.0, 1.0);
+    if (projection[2][3] == 0.0 || length(ahead) < 1e-3) return 0.0;
+    vec4 eye = vec4(0.0, 0.0, projection[3][3], 1.0);
+    ahead = normalize(ahead);
+    float behind = dot((view * vec4(middle, 1.0) - eye).xyz, ahead) + FADES_BEHIND * extent;
+    return (dot((view * vec4(at, 1.0) - eye).xyz, ahead) - max(behind, 0.0)) / (FADES_WITHIN * extent);
+}
 
 void main() {
     at = vec3(middle.x + around * corner.x, height, middle.z + around * corner.y);
+    beyond = beyond_plant();
     open = 1.0;
 #ifdef RECEIVES
     // As nothing is in the way far away, it rises to 1 at the rim.

@@ -67,9 +67,10 @@ void main() {
         vec3 half_way = normalize(LAMP + vec3(0.0, 0.0, 1.0));
         float gloss = pow(max(dot(normal, half_way), 0.0), SHARPNESS) - pow(half_way.z, SHARPNESS);
         float cosine = dot(normal, LAMP);
-        float diffuse = (max(cosine + WRAP, 0.0) - (LAMP.z + WRAP)) / (1.0 + WRAP) + through * max(-cosine, 0.0);
+        float here = DIFFUSE * (max(cosine + WRAP, 0.0) - (LAMP.z + WRAP)) / (1.0 + WRAP) + ABOVE * normal.y;
+        float behind = DIFFUSE * (max(WRAP - cosine, 0.0) - (LAMP.z + WRAP)) / (1.0 + WRAP) - ABOVE * normal.y;
         // Ground goes on behind the plant.
-        strength = 1.0 - min(falloff * max(near - seen.z, 0.0), 0.25) + relief * (DIFFUSE * diffuse + ABOVE * normal.y + GLOSS * gloss);
+        strength = 1.0 - min(falloff * max(near - seen.z, 0.0), 0.25) + relief * (here + through * max(behind - here, 0.0) + GLOSS * gloss);
     } else {
         bool has_sun = dot(sun, sun) > 0.0;
         vec2 sky = gl_FrontFacing ? open : open.yx;

@@ -17,6 +17,7 @@
 mod cell_set;
 mod contour;
 mod edges;
+mod faded;
 mod hidden;
 mod label;
 mod memory;
@@ -47,6 +48,7 @@ use super::triangles::{Solid, Triangles};
 use super::tube::{TubeStyle, Tubes, sides_for};
 use contour::Corner;
 use dlsys_geometry::scene::{Face, OwnerId, Point, Scene, Segment};
+use faded::Faded;
 use hidden::{Part, Visible};
 use label::{Look, Seen, Stems};
 pub(super) use memory::Memory;
@@ -166,6 +168,8 @@ pub(super) fn elements(
     let parted = |a: usize, b: usize| is_stroke(a) && is_stroke(b);
     let mut strokes = Strokes::new(scene, style, prefix, parted).lit(lit.lighting());
     let mut paths: Vec<(OwnerId, String)> = Vec::new();
+    let (fading, mut floor_owner, mut far_floor) =
+        (Faded::of(style, lit.lighting(), casting), None, Vec::new());
     for (shade, outlines) in shades.iter().zip(&outlines).filter(|(_, outlines)| !outlines.is_empty()) {
         let (owner, material) = shade.item.look;
         let fill = match shade.item.stem.and_then(|stem| scene.segments.get(stem as usize)) {
@@ -177,11 +181,28 @@ pub(super) fn elements(
         };
         let mut data = String::new();
         outlines.iter().for_each(|outline| push_outline(&mut data, outline, to_page, decimals));
+        if style.floor == Some(material) {
+            floor_owner = Some(owner);
+            let far = fading
+                .as_ref()
+                .is_some_and(|fading| outlines.iter().flatten().any(|at| fading.is_faint(to_page(*at)[1])));
+            far_floor.extend(far.then(|| data.clone()));
+        }
         paths.push((owner, format!("<path fill=\"{fill}\" d=\"{data}\"/>")));
     }
     let mut page = PageWriter::new(scene, style, named);
     let over = plan.as_ref().map(|plan| page.under_regions(scene, &plan.strokes, &mut strokes, &visible));
-    page.groups(&paths);
+    // The floor is the last module.
+    let floor = paths.iter().position(|(owner, _)| Some(*owner) == floor_owner).unwrap_or(paths.len());
+    page.groups(&paths[..floor]);
+    match fading.filter(|_| !far_floor.is_empty()) {
+        Some(fading) => {
+            page.out.push_str(&fading.begin(&far_floor, prefix));
+            page.groups(&paths[floor..]);
+            page.out.push_str("</g>\n");
+        }
+        None => page.groups(&paths[floor..]),
+    }
     match over {
         Some(over) => over.iter().for_each(|(owner, parts)| page.strokes(*owner, parts, &mut strokes)),
         None => {
