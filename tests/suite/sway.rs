@@ -384,3 +384,24 @@ fn stems_stop_at_the_limit_of_time() {
     );
     assert!(begun.elapsed().as_secs() < 30, "{:?}", begun.elapsed());
 }
+
+/// A horizontal rod sags by q L⁴/(8 E I), however its segments are written: one is one `F`.
+#[test]
+fn every_step_of_a_drawing_is_a_segment() {
+    let (diameter, length) = (0.02_f64, 2.0_f64);
+    let inertia = std::f64::consts::PI * diameter.powi(4) / 64.0;
+    let load = 800.0 * 9.81 * std::f64::consts::PI * diameter * diameter / 4.0;
+    let sag = load * length.powi(4) / (8.0 * 2e10 * inertia);
+    for drawn in [
+        "!(0.02) for i in 1 .. 20: ( F(0.1) ) @O(0.0001)\n",
+        "S @O(0.0001)\ninterpret S: !(0.02) for i in 1 .. 20: ( F(0.1) )\n",
+        "S @O(0.0001)\ninterpret S: for i in 1 .. 20: ( !(0.02) F(0.1) )\n",
+    ] {
+        let text = format!(
+            "units length 1, time 1\ntissue wood = stiffness 2e10, density 800, damping 0.7, sag\ninitial string: -(90) @E(wood) {drawn}"
+        );
+        let scene = scenes(&read("rod.dls", &text), &[20.0]).remove(0);
+        let tip = scene.surfaces.last().expect("a ball").placement.origin;
+        assert!((tip.y / -sag - 1.0).abs() < 0.005, "{drawn}: {tip}, not {sag}");
+    }
+}

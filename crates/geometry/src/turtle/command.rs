@@ -159,11 +159,6 @@ impl Command {
         }
     }
 
-    /// True for a step that may continue the stem before it.
-    pub(super) fn is_step(self) -> bool {
-        matches!(self, Command::Draw | Command::Nothing | Command::Interpret(_) | Command::Color)
-    }
-
     /// How many parameters it reads, at most.
     pub(super) fn parameters(self) -> usize {
         match self {

@@ -64,8 +64,6 @@ struct State {
     stem: Option<usize>,
     /// What is drawn here is let go: the number of its part, from 0 in the order of drawing.
     part: Option<usize>,
-    /// The number of the stem that a step here continues.
-    joined: Option<u32>,
 }
 
 /// What stands at a place of an axis.
@@ -152,7 +150,6 @@ impl<'a> Walk<'a> {
                 bent: None,
                 stem: None,
                 part: None,
-                joined: None,
             },
             stack: Vec::new(),
             polygons: Vec::new(),
@@ -232,7 +229,7 @@ impl<'a> Walk<'a> {
     pub(super) fn set_drawn(&mut self, module: DrawnModule) {
         self.drawn = module;
         self.owner = None;
-        (self.depth, self.stems_drawn, self.state.joined) = (self.stack.len(), 0, None);
+        (self.depth, self.stems_drawn) = (self.stack.len(), 0);
         (self.parts_drawn.0, self.sources_drawn, self.sheets_drawn) = (0, 0, 0);
         self.solid = None;
         if let Some(recorder) = &mut self.recorder
@@ -287,9 +284,6 @@ impl<'a> Walk<'a> {
             return Err(Error { name, ..self.error(ErrorKind::NotFinite { value }) });
         }
         let given = read.first().copied();
-        if !command.is_step() {
-            self.state.joined = None;
-        }
         match command {
             Command::Nothing | Command::Interpret(_) => {}
             Command::Draw => self.step(given.unwrap_or(1.0), true)?,

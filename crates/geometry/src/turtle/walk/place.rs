@@ -194,7 +194,7 @@ impl Walk<'_> {
         }
         let state = &mut self.state;
         state.part = Some(self.parts_drawn.1);
-        (state.stem, state.joined, state.last, state.parent) = (None, None, None, None);
+        (state.stem, state.last, state.parent) = (None, None, None);
         self.parts_drawn = (self.parts_drawn.0 + 1, self.parts_drawn.1 + 1);
     }
 
@@ -213,6 +213,6 @@ impl Walk<'_> {
             let Some(height) = scenery.surface(at.x, at.z).filter(|height| *height != at.y) else { return };
             (self.state.position.y, self.state.remainder.y) = (height, 0.0);
         }
-        (self.state.last, self.state.joined) = (None, None);
+        self.state.last = None;
     }
 }

@@ -29,10 +29,7 @@ impl Walk<'_> {
         }
         let strain = match self.state.tissue {
             Some(_) if draw && self.polygons.is_empty() && length >= 0.0 => self.giving()?,
-            _ => {
-                self.state.joined = None;
-                None
-            }
+            _ => None,
         };
         let bend = Bend::new(heading, self.target, self.state.strength).filter(|_| length != 0.0);
         let is_curved = bend.is_some() || strain.is_some_and(|strain| strain != Vector::zeros());
@@ -81,24 +78,16 @@ impl Walk<'_> {
         Ok(())
     }
 
-    /// Begins or continues a stem that gives way: its strain, in the turtle's axes.
+    /// Begins a stem that gives way: its strain, in the turtle's axes.
     fn giving(&mut self) -> Result<Option<Vector>, Error> {
         let Some(tissue) = self.state.tissue else { return Ok(None) };
         let Width::Set(width) = self.state.width else {
             return Err(self.error(ErrorKind::NoWidth));
         };
         let DrawnModule { kind, lineage } = self.drawn;
-        let number = match self.state.joined {
-            Some(number) => number,
-            None => {
-                self.stems_drawn += 1;
-                self.stems_drawn - 1
-            }
-        };
-        let key = StemKey::of(lineage, number);
-        if let Some(recorder) = &mut self.recorder
-            && self.state.joined.is_none()
-        {
+        let key = StemKey::of(lineage, self.stems_drawn);
+        self.stems_drawn += 1;
+        if let Some(recorder) = &mut self.recorder {
             let (start, axes) = (self.state.position, self.state.frame.vectors());
             let stem = Stem {
                 key,
@@ -121,7 +110,6 @@ impl Walk<'_> {
                 }
             }
         }
-        self.state.joined = Some(number);
         Ok(Some(self.strains.map_or_else(Vector::zeros, |strains| strains.strain(key, width))))
     }
 
@@ -129,7 +117,7 @@ impl Walk<'_> {
     fn end_stem(&mut self, length: f64) {
         if let (Some(recorder), Some(stem)) = (&mut self.recorder, self.state.stem) {
             let stem = &mut recorder.stems[stem];
-            stem.length += length;
+            stem.length = length;
             (stem.end, stem.end_axes) = (self.state.position, self.state.frame.vectors());
         }
     }
