@@ -267,3 +267,17 @@ fn radau_begins_at_a_kink_within_an_age_at_any_tolerance() {
         assert!((s - 0.34).abs() < 1e-9 && (o - 1.0).abs() < 1e-9, "{tolerance}: {s}, {o}");
     }
 }
+
+#[test]
+fn what_grows_from_next_to_nothing_is_right_when_it_is_large() {
+    // Bernoulli's equation: x^-3 = 1 + (x0^-3 - 1) exp(-3t). A number that is so small is nothing beside 1, and all of what there is.
+    for start in [1e-12_f64, 1e-19, 1e-30, 1e-90] {
+        let half = -start.ln();
+        for method in [Method::Auto, Method::Dopri5, Method::Radau] {
+            let text = format!("initial string: A({start:e})\nA(x): solve dx/dt = x*(1 - x^3)");
+            let settings = Settings { method, ..Settings::default() };
+            let x = run(&text, settings, &[half]).expect("runs")[0][0].1[0];
+            assert!((x - 0.5_f64.cbrt()).abs() < 1e-4, "{method:?} from {start:e}: {x}");
+        }
+    }
+}

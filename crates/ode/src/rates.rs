@@ -40,6 +40,11 @@ pub trait Rates {
         0.0
     }
 
+    /// True if the components are those of one module, and nothing else is integrated with them. False by default.
+    fn stands_alone(&self) -> bool {
+        false
+    }
+
     /// True if the rates depend on absolute time, which has the resolution of a float. False by default.
     fn is_timed(&self) -> bool {
         false
@@ -108,6 +113,10 @@ impl<R: Rates> Rates for Shifted<'_, R> {
 
     fn modules(&self) -> u64 {
         self.system.modules()
+    }
+
+    fn stands_alone(&self) -> bool {
+        self.system.stands_alone()
     }
 
     fn is_timed(&self) -> bool {

@@ -4,8 +4,10 @@ use crate::Rates;
 use crate::column::Column;
 use crate::one_step::Trial;
 
-/// Errors below the tolerated part of this are ignored, whatever the size of the component.
+/// Errors below the tolerated part of this are ignored, whatever the size of the component, but for what grows from less.
 pub(crate) const FLOOR: f64 = 1e-18;
+/// The same where something does.
+const LEAST: f64 = 1e-290;
 
 /// The part of a component that no rate reads to which the error of a step is relative, where it goes less far in the step; more where
 /// rounding is in the way.
@@ -71,6 +73,8 @@ pub struct Workspace {
     pub(crate) resolution: f64,
     /// The same if they depend on time or an age.
     pub(crate) tick: f64,
+    /// See [`FLOOR`].
+    pub(crate) floor: f64,
     /// Evaluations of the equations of single modules so far.
     pub(crate) evaluations: u64,
     /// Steps of single modules tried so far.
@@ -83,6 +87,7 @@ impl Workspace {
     /// Fits the memory to systems of `n` components, and makes room for so many stages.
     pub fn provide(&mut self, n: usize, stages: usize) {
         self.end.resize(n, 0.0);
+        self.floor = FLOOR;
         if self.provided == (n, stages) {
             return;
         }
@@ -207,6 +212,16 @@ impl Workspace {
         let next = if most <= 1e-15 { (guess * 1e-3).max(1e-6) } else { (0.01 / most).powf(1.0 / order) };
         let size = next.min(100.0 * guess);
         if size.is_finite() && size > 0.0 { size } else { 1e-6 }
+    }
+
+    /// Finds below which size of a component errors are ignored. What grows by itself keeps its relative error however small it is, and may
+    /// become large; among components of several modules that would make steps short where next to nothing of something has arrived.
+    pub(crate) fn find_floor(&mut self, system: &impl Rates, y: &[f64]) {
+        let grows = |(y, rate): (&f64, &f64)| {
+            *y != 0.0 && y.abs() < FLOOR && *rate != 0.0 && (*y > 0.0) == (*rate > 0.0)
+        };
+        let is_least = system.stands_alone() && y.iter().zip(self.k[0].iter()).any(grows);
+        self.floor = if is_least { LEAST } else { FLOOR };
     }
 
     /// Estimates the error of each rate by rounding of the state, from the partial derivatives, and of its terms.

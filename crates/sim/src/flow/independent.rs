@@ -225,6 +225,10 @@ impl Rates for Independent<'_> {
         1
     }
 
+    fn stands_alone(&self) -> bool {
+        true
+    }
+
     fn mark_sums(&self, is_sum: &mut [bool]) {
         for (is_sum, variable) in is_sum.iter_mut().zip(&self.numeric) {
             *is_sum = !self.solve.jacobian.entries.iter().any(|entry| entry.1 == *variable);

@@ -6,7 +6,7 @@
 use super::super::dop853::join_estimates;
 use super::{Pair, Receiver};
 use crate::column::{Column, Stage};
-use crate::workspace::{FLOOR, MAX_STAGES, Workspace, part_of_sum};
+use crate::workspace::{MAX_STAGES, Workspace, part_of_sum};
 use dlsys_wide::Kernel;
 use std::marker::PhantomData;
 
@@ -146,6 +146,8 @@ struct Scale {
     tolerance: f64,
     /// The error of a change of the rates, because time is known no better.
     blur: f64,
+    /// See [`FLOOR`](crate::workspace::FLOOR).
+    floor: f64,
 }
 
 /// What is known of a component: its values at the start and the end, its rates there and at the second stage, the part of its value that counts
@@ -161,8 +163,8 @@ struct Known {
 
 impl Scale {
     /// The scale of a step of this length, with time known to a resolution.
-    fn of<P: Pair>(h: f64, tolerance: f64, resolution: f64) -> Scale {
-        Scale { h, tolerance, blur: 4.0 * resolution / P::TABLEAU.c[1] }
+    fn of<P: Pair>(h: f64, tolerance: f64, (resolution, floor): (f64, f64)) -> Scale {
+        Scale { h, tolerance, blur: 4.0 * resolution / P::TABLEAU.c[1], floor }
     }
 
     /// The errors of a component by truncation and by rounding, given the estimate of the former.
@@ -177,7 +179,7 @@ impl Scale {
         // Rates that depend on time are known as well as time is.
         let blur = self.blur * (second - departure).abs();
         let blur = blur + 4.0 * self.h.abs() * noise;
-        let scale = self.tolerance * ((from.abs() * part).max(self.h.abs() * speed) + FLOOR) + blur;
+        let scale = self.tolerance * ((from.abs() * part).max(self.h.abs() * speed) + self.floor) + blur;
         (estimate / scale, 4.0 * f64::EPSILON * end.abs() / scale)
     }
 }
@@ -346,9 +348,9 @@ fn combine_few<W: Weights, K: Stage>(from: &[f64], k: &[K; MAX_STAGES], n: usize
 pub(super) fn largest_error<P: Pair>(
     step: Tried<impl Stage>,
     n: usize,
-    (h, tolerance, resolution): (f64, f64, f64),
+    (h, tolerance, known): (f64, f64, (f64, f64)),
 ) -> (f64, f64) {
-    let scale = Scale::of::<P>(h, tolerance, resolution);
+    let scale = Scale::of::<P>(h, tolerance, known);
     run(n, LargestError::<P, _> { step, n, scale, pair: PhantomData })
 }
 
@@ -388,7 +390,7 @@ impl Workspace {
 
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
     pub(super) fn largest_error<P: Pair>(&self, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
-        let scale = Scale::of::<P>(h, tolerance, self.resolution);
+        let scale = Scale::of::<P>(h, tolerance, (self.resolution, self.floor));
         if n > FEW {
             let Workspace { from, stage: end, is_sum, noise, .. } = self;
             let step = Tried { k: self.stages(), from, end, is_sum, noise };

@@ -12,7 +12,7 @@ use super::{AtPlace, Pair};
 use crate::dense::{Dense, PLACE};
 use crate::one_step::{InteriorError, Step, Trial};
 use crate::rates::{Part, Rates};
-use crate::workspace::{MAX_STAGES, Workspace};
+use crate::workspace::{FLOOR, MAX_STAGES, Workspace};
 use dlsys_expr::SimTime;
 use dlsys_threads::Meeting;
 use std::ops::Range;
@@ -83,7 +83,7 @@ impl Share<'_, '_> {
     }
 
     /// Tries the step; returns the errors by truncation and by rounding, and whether all values are finite.
-    fn attempt<P: Pair>(&mut self, crew: &Crew, scale: (f64, f64, f64)) -> (f64, f64, bool) {
+    fn attempt<P: Pair>(&mut self, crew: &Crew, scale: (f64, f64, (f64, f64))) -> (f64, f64, bool) {
         let (tableau, own) = (P::TABLEAU, self.components.len());
         self.from.copy_from_slice(self.y);
         for stage in 1..tableau.stages {
@@ -213,7 +213,7 @@ impl Workspace {
         Step { y, h, .. }: Step<'_>,
         tolerance: f64,
     ) -> Trial {
-        let scale = (h, tolerance, self.resolution);
+        let scale = (h, tolerance, (self.resolution, FLOOR));
         let all = self.together(parts, y, (&mut [], 0), |share, crew| share.attempt::<P>(crew, scale));
         let are_finite = all.iter().all(|(.., are_finite)| *are_finite);
         // A NaN is the largest of all.

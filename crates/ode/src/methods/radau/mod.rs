@@ -16,7 +16,7 @@ use crate::Rates;
 use crate::dense::Dense;
 use crate::one_step::{InteriorError, OneStep, Step, Trial};
 use crate::sparse::Pattern;
-use crate::workspace::{FLOOR, Workspace};
+use crate::workspace::Workspace;
 use dlsys_expr::SimTime;
 use stages::{Attempt, Beginning, Form, Stages, Start, Stiff};
 
@@ -171,7 +171,8 @@ impl OneStep for Radau {
         self.scale.clear();
         // As for explicit methods; but the rate at the start of a fast transient says nothing about its size.
         let largest = if largest > 0.0 { largest } else { f64::INFINITY };
-        let scale = |(y, f): (&f64, &f64)| tolerance * (y.abs().max((h * f).abs().min(largest)) + FLOOR);
+        let floor = work.floor;
+        let scale = |(y, f): (&f64, &f64)| tolerance * (y.abs().max((h * f).abs().min(largest)) + floor);
         self.scale.extend(y.iter().zip(rate).map(scale));
         let Some(stages) = &mut self.stages else { return Trial::Diverged };
         let others = std::mem::take(&mut self.is_doubtful).then(|| system.couplings());

@@ -45,7 +45,7 @@ fn bits(all: &[f64]) -> Vec<u64> {
 }
 
 fn check<P: Pair>(mut work: Workspace, n: usize) {
-    let scale = Scale::of::<P>(H, TOLERANCE, work.resolution);
+    let scale = Scale::of::<P>(H, TOLERANCE, (work.resolution, work.floor));
     let mut each: Vec<Workspace> = (0..n).map(|j| alone(&work, j)).collect();
     let errors = each.iter().map(|one| one.largest_error::<P>(1, H, TOLERANCE));
     let largest = errors.fold((0.0f64, 0.0f64), |(a, b), (error, rounding)| {
