@@ -70,11 +70,7 @@ impl<R: Rates> Stiff for Placed<'_, R> {
     }
 
     fn form(&self) -> Form {
-        match (self.system.is_linear(), self.system.is_steady()) {
-            (true, true) => Form::LinearSteady,
-            (true, false) => Form::Linear,
-            _ => Form::Any,
-        }
+        if self.system.is_linear() && self.system.is_steady() { Form::LinearSteady } else { Form::Any }
     }
 }
 

@@ -21,9 +21,7 @@ pub trait Stiff {
 pub enum Form {
     /// Nothing.
     Any,
-    /// df/dy is the same everywhere.
-    Linear,
-    /// And f depends on y alone.
+    /// df/dy is the same everywhere, and f depends on y alone.
     LinearSteady,
 }
 

@@ -1,10 +1,10 @@
-//! The stages of a step of a linear system: one solution of its equations, without iteration.
+//! The stages of a step of a linear system whose rates depend on the state alone: one solution of its equations, without iteration.
 //!
 //! Elimination without pivoting is exact to rounding where a matrix is diagonally dominant ([`Pattern::is_dominant`](crate::Pattern::is_dominant)).
 //! Of any other, a solution is confirmed by an iteration that finds nothing left to correct: once for all steps of such a length,
 //! because what counts is the share of the couplings in the matrix.
 
-use super::{Attempt, Form, Iterations, Newton, pack, product, unpack};
+use super::{Attempt, Iterations, Newton, pack, product, unpack};
 use crate::methods::radau::stages::{Start, Stiff};
 use crate::sparse::Field;
 
@@ -21,19 +21,8 @@ impl<const S: usize, const L: usize> Newton<S, L> {
     ) -> Iterations {
         self.factor(problem, start, self.known == super::Jacobian::Unknown)?;
         let (n, h) = (self.w.len(), self.h);
-        if self.form == Form::LinearSteady {
-            let sums = pack::<S, L>(&product(&self.table.inverse, &[1.0; S]));
-            self.w.iter_mut().zip(start.rate).for_each(|(w, rate)| *w = sums.scale(h * rate));
-        } else {
-            for (rates, node) in self.rates.chunks_exact_mut(n).zip(&self.table.nodes) {
-                problem.rates(node * h, start.y, rates);
-                self.rates_used += 1;
-            }
-            for (i, w) in self.w.iter_mut().enumerate() {
-                let f: [f64; S] = std::array::from_fn(|j| h * self.rates[j * n + i]);
-                *w = pack(&product(&self.table.inverse, &f));
-            }
-        }
+        let sums = pack::<S, L>(&product(&self.table.inverse, &[1.0; S]));
+        self.w.iter_mut().zip(start.rate).for_each(|(w, rate)| *w = sums.scale(h * rate));
         start.pattern.solve(&self.factors, &mut self.w);
         let mut check = 0.0;
         for (i, w) in self.w.iter().enumerate() {
