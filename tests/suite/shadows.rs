@@ -233,6 +233,31 @@ fn a_declared_camera_sees_its_aim_in_the_middle() {
     assert_eq!(survey.fit().for_frame(&scene, &page).1, page);
 }
 
+/// How a floor fades, and where it is darker, follows from the camera and from what stands there, not from what goes far away later.
+#[test]
+fn a_picture_of_a_declared_camera_does_not_depend_on_other_frames() {
+    let mut scene = pole();
+    scene.surroundings.floor_color = Some(Color::hex(0x7f9a4e));
+    scene.surroundings.camera =
+        Some(Viewpoint { eye: Point::new(2.0, 3.0, 12.0), aim: Point::new(0.0, 2.0, 0.0), angle: 40.0 });
+    let later = self::scene("+(90)!(0.2)F(90)");
+    let picture = |others: &[&Scene]| {
+        let mut survey = Survey::new(View::FRONT);
+        survey.add(&scene);
+        others.iter().for_each(|other| survey.add(other));
+        let (fit, page) = survey
+            .fit_of_width(0.1)
+            .with_accuracy(0.01)
+            .for_frame(&scene, &Page::new(survey.fit().picture, Size::Exact(200, 200), None).expect("small"));
+        pixels_by(&scene, &fit, &page, Smoothness::Fine, 1)
+    };
+    let [alone, among] = [picture(&[]), picture(&[&later])];
+    let far = |a: &[u8; 4], b: &[u8; 4]| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max();
+    let most = alone.iter().zip(&among).filter_map(|(a, b)| far(a, b)).max();
+    assert!(most <= Some(12), "{most:?}");
+    assert_ne!(alone[100 * 200 + 20], alone[190 * 200 + 20], "the floor fades");
+}
+
 fn squares() -> Scene {
     let mut scene = Scene::default();
     let owner = scene.add_owner(Owner { name: "P".into(), lineage: Lineage::of_axiom(0) });

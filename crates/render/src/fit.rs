@@ -175,6 +175,7 @@ impl Survey {
             follows_cameras: self.follows_cameras,
             turn: 0.0,
             shaded: None,
+            aimed: None,
         }
     }
 }
@@ -209,6 +210,8 @@ pub struct Fit {
     turn: f64,
     /// The part of what the camera sees in which the floor has shades: left, bottom, right and top. `None`: all of it.
     pub(super) shaded: Option<[f64; 4]>,
+    /// The aim of a declared camera, and the smaller side of what it sees there.
+    aimed: Option<(Point, f64)>,
 }
 
 /// The shape of pictures of declared cameras: width by height.
@@ -223,6 +226,12 @@ fn joined(flags: &Surroundings, scene: &Surroundings) -> Surroundings {
         floor: flags.floor.or(scene.floor),
         floor_color: flags.floor_color.or(scene.floor_color),
     }
+}
+
+/// The smaller side of what a declared camera sees in its plane of focus, before a flag magnifies it.
+fn seen_side(at: &Viewpoint) -> f64 {
+    let slope = (at.angle.clamp(*Camera::FIELDS.start(), *Camera::FIELDS.end()) / 2.0).to_radians().tan();
+    2.0 * (at.eye - at.aim).norm() * slope
 }
 
 impl Fit {
@@ -251,10 +260,9 @@ impl Fit {
         Fit { accuracy, ..self }
     }
 
-    /// The smaller side of what a declared camera sees in its plane of focus.
+    /// The smaller side of what a declared camera shows in its plane of focus.
     fn smaller_side(&self, at: &Viewpoint) -> f64 {
-        let slope = (at.angle.clamp(*Camera::FIELDS.start(), *Camera::FIELDS.end()) / 2.0).to_radians().tan();
-        2.0 * (at.eye - at.aim).norm() * slope / self.zoom
+        seen_side(at) / self.zoom
     }
 
     /// The same for a camera that has gone round the axis y by this angle, in degrees from the front towards the side: cameras of flags and of the model round the vertical axis through their aim.
@@ -301,8 +309,16 @@ impl Fit {
         joined(&self.declared, &scene.surroundings)
     }
 
-    /// The middle of everything, and the extent, which is not 0.
+    /// Whether a declared camera shows the frame.
+    pub(super) fn is_aimed(&self) -> bool {
+        self.aimed.is_some()
+    }
+
+    /// The middle of everything, and the extent, which is not 0; of a declared camera what it is aimed at, which no other frame changes.
     pub(super) fn middle(&self) -> (Point, f64) {
+        if let Some(aimed) = self.aimed {
+            return aimed;
+        }
         let middle = self.bounds.map_or_else(Point::origin, |[low, high]| nalgebra::center(&low, &high));
         (middle, if self.extent > 0.0 { self.extent } else { 1.0 })
     }
@@ -325,7 +341,8 @@ impl Fit {
         let [w, h] = [width, height].map(|side| smaller * side / width.min(height));
         let aim = camera.project(at.aim);
         let picture = Picture::of([aim.x - w / 2.0, aim.y - h / 2.0, w, h]);
-        (Fit { camera, picture, ..self.clone() }, Page { picture, ..*page })
+        let aimed = Some((at.aim, seen_side(&at)));
+        (Fit { camera, picture, aimed, ..self.clone() }, Page { picture, ..*page })
     }
 
     /// Left, bottom, right and top of a survey as this camera sees it; `None` if it is empty.

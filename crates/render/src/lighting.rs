@@ -8,7 +8,7 @@ use super::floor::Fading;
 use super::haze::{self, Haze};
 use super::lens::Lens;
 use super::light::{GLOSS, Light, SHARPNESS, Spot, TRANSMITTED};
-use super::shadow::{Fineness, Maps, OpenSky};
+use super::shadow::{Fineness, Maps, OpenSky, thrown};
 use super::{Camera, Fit, Page, floor, light};
 use dlsys_geometry::scene::{Color, MaterialId, Point, Scene, Surroundings, Vector};
 
@@ -27,6 +27,8 @@ const POOL_REACH: f64 = 1.2;
 /// The colour of bare ground, and its part beside the haze of the horizon in the floor under a declared sky.
 const EARTH: Color = Color::hex(0xa99a78);
 const EARTHY: f64 = 0.6;
+/// How much of the sky's tint is seen where only the sky lights: what stands around throws warmer light there.
+const TINTED: f64 = 0.5;
 /// Strengths between which the colour of light changes from the sky's to the sun's.
 const COOL: f64 = 0.35;
 const WARM: f64 = 0.85;
@@ -63,6 +65,8 @@ pub(super) struct Lighting<'a> {
     maps: Option<Maps>,
     floor: Option<f64>,
     open_sky: Option<OpenSky>,
+    /// The middle of what the floor is darker around, and its extent.
+    pool: (Vector, f64),
     /// The colour of the floor, if it has one of its own.
     ground: Option<Color>,
     fading: Option<Fading>,
@@ -91,9 +95,9 @@ impl<'a> Lighting<'a> {
             Declared { sun, sky, tint: mean.map(|c| c / most) }
         });
         let floor = around.floor.filter(|_| !fit.light.is_flat());
-        let mut open_sky = None;
+        let (middle, extent) = fit.middle();
+        let (mut open_sky, mut pool) = (None, (middle.coords, extent));
         let maps = (declared.is_some() || floor.is_some()).then(|| {
-            let extent = if fit.extent > 0.0 { fit.extent } else { 1.0 };
             let larger = lens.map_or(f64::INFINITY, |lens| lens.size[0].max(lens.size[1]) as f64);
             // Soil is a surface on which the edges of single maps would be seen.
             let fineness = Fineness::of(if scene.terrain.is_some() { f64::INFINITY } else { larger });
@@ -104,6 +108,10 @@ impl<'a> Lighting<'a> {
                     || lens.is_none_or(|lens| is_shadow_seen(lens, (middle, radius), sun, floor))
             };
             let casters = Casters::new(scene, fit, scale.min(1500.0 / extent), seen, ground, counts, threads);
+            if fit.is_aimed() && casters.count() > 0 {
+                let [middle, half] = casters.core();
+                pool = (middle, (2.0 * half.amax()).max(f64::MIN_POSITIVE));
+            }
             let maps = (casters.count() > 0).then(|| Maps::new(&casters, sun, scale, fineness, threads))?;
             open_sky = floor.map(|height| OpenSky::new(&maps, casters.around(), height, fineness, threads));
             Some(maps)
@@ -122,7 +130,7 @@ impl<'a> Lighting<'a> {
             visible: &visible,
         };
         let haze = Haze::new(scene, fit.camera, &around, threads);
-        Lighting { fit, declared, maps, floor, open_sky, ground, fading, haze }
+        Lighting { fit, declared, maps, floor, open_sky, pool, ground, fading, haze }
     }
 
     /// How the floor fades into the horizon, if it does.
@@ -207,7 +215,7 @@ impl<'a> Lighting<'a> {
     /// A colour in light of this strength.
     pub(super) fn color(&self, color: Color, strength: f64) -> Color {
         let Some(declared) = &self.declared else { return color.lit(strength) };
-        let warm = ((strength - COOL) / (WARM - COOL)).clamp(0.0, 1.0);
+        let warm = 1.0 - TINTED * (1.0 - ((strength - COOL) / (WARM - COOL)).clamp(0.0, 1.0));
         let [red, green, blue] = [0, 1, 2].map(|k| declared.tint[k] + (1.0 - declared.tint[k]) * warm);
         let tinted = |c: u8, by: f64| (f64::from(c) * by + 0.5) as u8;
         Color {
@@ -231,14 +239,14 @@ impl<'a> Lighting<'a> {
     /// Strength of light on the floor, beside that on an open floor far away.
     pub(super) fn floor_strength(&self, seen: Point) -> f64 {
         let at = self.fit.camera.unproject(seen).coords;
-        let (centre, extent) = self.fit.middle();
+        let (centre, extent) = self.pool;
         let away = ((at.x - centre.x).hypot(at.z - centre.z) / (POOL_REACH * extent)).powi(2);
         let pool = 1.0 - POOL * (-away).exp();
         let sky = self.open_sky.as_ref().map_or(1.0, |open_sky| open_sky.at(at));
         let light = match &self.declared {
             None => 1.0 - CONTACT * (1.0 - sky),
             Some(declared) => {
-                let (mut here, mut open) = (declared.sky * sky + 0.04, declared.sky + 0.04);
+                let (mut here, mut open) = (declared.sky * thrown(sky) + 0.04, declared.sky + 0.04);
                 if let Some(sun) = declared.sun.filter(|sun| sun.y > 0.0) {
                     here += SUN * sun.y * self.sunlight(at, Vector::y(), sun);
                     open += SUN * sun.y;

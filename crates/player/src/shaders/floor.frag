@@ -31,7 +31,7 @@ void main() {
             if (sun > 0.0) past = sunlit(at, vec3(0.0, 1.0, 0.0));
         }
 #endif
-        strength = (sky * open + LEAST + sun * past) / (sky + LEAST + sun);
+        strength = (sky * thrown(open) + LEAST + sun * past) / (sky + LEAST + sun);
     }
     strength = (1.0 - POOL * exp(-dot(away, away))) * min(strength, 1.0);
     // As the drawing gains depth.

@@ -19,4 +19,10 @@ float open_sky(vec3 at, vec3 normal) {
     // The mean cosine over the places is a half.
     return 2.0 * sum / float(PLACES);
 }
+
+// The same, and what of it comes from one surface to the next.
+float open_side(vec3 at, vec3 normal) {
+    float free = max(0.5 + 0.5 * normal.y, 1e-3);
+    return free * thrown(open_sky(at, normal) / free);
+}
 #endif

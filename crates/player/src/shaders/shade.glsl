@@ -6,6 +6,14 @@ const float SKY_ALONE = 1.25;
 const float SUN = 0.66;
 const float GROUND = 0.26;
 const float LEAST = 0.04;
+const float TINTED = 0.5;
+
+// The strength of the sky's light at a place from which this part of the sky is seen.
+float thrown(float part) {
+    if (part >= 1.0) return part;
+    float light = max(max(part, ((0.688 * part - 1.756) * part + 2.068) * part), 0.0);
+    return part + (sqrt(light) - part) * (1.0 - part) * (1.0 - part);
+}
 
 // The ball whose insides cast shadows, and how deep the maps are, in scene units.
 uniform vec3 middle;
@@ -49,7 +57,7 @@ bool is_within(vec2 place, float rim) {
 
 // A colour in light of this strength; `tint` is that of a declared sky, its first number negative without one.
 vec3 lit(vec3 color, float strength, vec3 tint) {
-    if (tint.r >= 0.0) color *= mix(tint, vec3(1.0), clamp((strength - 0.35) / 0.5, 0.0, 1.0));
+    if (tint.r >= 0.0) color *= mix(vec3(1.0), tint, TINTED * (1.0 - clamp((strength - 0.35) / 0.5, 0.0, 1.0)));
     vec3 shadow = vec3(0.0, 0.05, 0.15);
     vec3 seen = strength <= 1.0
         ? color * (shadow + (1.0 - shadow) * strength)

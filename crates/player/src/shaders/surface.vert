@@ -27,7 +27,7 @@ void main() {
     facing = mat3(view) * normal;
     shade = color;
 #ifdef RECEIVES
-    open = vec2(open_sky(corner, normal), open_sky(corner, -normal));
+    open = vec2(open_side(corner, normal), open_side(corner, -normal));
 #else
     open = 0.5 + vec2(0.5, -0.5) * normal.y;
 #endif

@@ -44,7 +44,7 @@ use super::name::Names;
 use super::painter::Style;
 use super::raster::cells::Middles;
 use super::stroke::{End, Stroke, Strokes, is_thin, pixels_across};
-use super::triangles::{Solid, Triangles};
+use super::triangles::{Solid, Triangle, Triangles};
 use super::tube::{TubeStyle, Tubes, sides_for};
 use contour::Corner;
 use dlsys_geometry::scene::{Face, OwnerId, Point, Scene, Segment};
@@ -60,6 +60,9 @@ use tones::Tones;
 
 /// Cells for each pixel of the page, along a side.
 pub(super) const CELLS_PER_PIXEL: f64 = 2.0;
+/// The same before a background, where half of the area is in surfaces that are so many pixels large: what has few edges for its size needs fewer.
+const OF_LARGE: f64 = 1.5;
+const LARGE: f64 = 200.0;
 /// Least and most cells on the larger side of a picture.
 const LEAST_CELLS: f64 = 1000.0;
 pub(super) const MOST_CELLS: f64 = 4000.0;
@@ -114,8 +117,13 @@ pub(super) fn elements(
     drop(beside);
     let is_fine = mesh.faces.len() > PLAIN;
     let seen: Vec<Point> = mesh.vertices.iter().map(|p| style.fit.camera.project(*p)).collect();
+    let per_side = match is_fine {
+        false => 1.0,
+        true if style.background.is_some() && large(&mesh, &seen) * style.pixels.powi(2) >= LARGE => OF_LARGE,
+        true => CELLS_PER_PIXEL,
+    };
     mesh.without_far_sides(&seen);
-    let cell = if is_fine { finest } else { cell_of(1.0) };
+    let cell = cell_of(per_side);
     // Cells in a pixel of the page.
     let per_pixel = (cell * style.pixels).powi(-2);
     let [a, b, c] = [1.0 / cell, -left / cell, (bottom + height) / cell];
@@ -249,6 +257,24 @@ fn mesh(
     let style = TubeStyle { floor: scene.surroundings.floor, ..fit.tubes() };
     let tubes = Tubes::of(scene, style, sides, near);
     Triangles::of(&Solid::of(scene, tubes, Cow::Borrowed(&scene.surfaces)), kept)
+}
+
+/// The area of the surface up to which, from the smallest on, surfaces have half of the area of all, in the units of the plane of focus.
+fn large(mesh: &Triangles, seen: &[Point]) -> f64 {
+    let area = |face: &Triangle| {
+        let [a, b, c] = face.corners.map(|(vertex, _)| seen[vertex as usize]);
+        ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)).abs() / 2.0
+    };
+    let surfaces = mesh.faces.chunk_by(|a, b| a.surface == b.surface);
+    let mut areas: Vec<f64> = surfaces.map(|faces| faces.iter().map(area).sum()).collect();
+    areas.sort_by(f64::total_cmp);
+    let half = areas.iter().sum::<f64>() / 2.0;
+    let mut below = 0.0;
+    let largest = areas.iter().find(|area| {
+        below += **area;
+        below >= half
+    });
+    largest.copied().unwrap_or(0.0)
 }
 
 /// The rectangle of cells that triangles touch, within a picture of this size or a little beyond, and a cell around it: its first column and
