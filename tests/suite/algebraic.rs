@@ -223,3 +223,30 @@ fn values_that_jump_away_from_a_threshold_take_their_readers_along() {
         false => vec![vec![2.0], vec![2.0], vec![1.0], vec![1.0]],
     });
 }
+
+/// `dx/dt = 0.5 x exp(-0.2 x)` from 0.5 to about 6.77 at t = 9: a level that values or unknowns of a module's own pass is passed once each time.
+#[test]
+fn a_condition_on_a_value_of_its_own_is_met_once() {
+    // 3 x passes π, 2 π … 6 π. What is below its level at the beginning is replaced there, too.
+    for (value, level, met) in [
+        ("v = sin(3*x)", 0.0, 6.0),
+        ("v = x^2", 2.16, 2.0),
+        ("v = exp(-x)", 0.1028, 1.0),
+        ("v = x/(1 + x)", 0.6, 2.0),
+        ("0 = v + 0.3*v^3 - sin(3*x)", 0.0, 6.0),
+    ] {
+        for method in [Method::Auto, Method::Dopri5, Method::Radau] {
+            // What the successor begins with does not matter: it solves for the same.
+            for given in ["v", "0.3"] {
+                let text = format!(
+                    "axiom: A(0.5, 0, 0, 0.3)\nA(x, n, s, v): solve dx/dt = 0.5*x*exp(-0.2*x), {value}\n\
+                     if v < {level} & s = 0 produce A(x, n + 1, 1, {given})\n\
+                     if v > {level} & s = 1 produce A(x, n + 1, 0, {given})\n"
+                );
+                let settings = Settings { method, ..Settings::default() };
+                let states = run(&text, settings, &[9.0]).unwrap_or_else(|error| panic!("{error:?}\n{text}"));
+                assert_eq!(states[0][0].1[1], met, "{method:?}\n{text}");
+            }
+        }
+    }
+}

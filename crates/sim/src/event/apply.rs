@@ -180,6 +180,9 @@ impl EventStage<'_, '_> {
             }
             put_levels(&self.events.met, (&self.world.tree, fire.id), around, variables);
             set_levels(self.world, fire, (rule, self.setup.levels_decide[fire.rule]), self.scratch);
+            if self.setup.is_algebraic {
+                self.note_values(fire.id);
+            }
             let lineage = self.world.tree.lineage(fire.id);
             let residual = if self.log.records() { self.residual(fire) } else { 0.0 };
             let made = match clause.is_fault {
@@ -241,6 +244,16 @@ impl EventStage<'_, '_> {
         self.log.stats.events += firing.len() as u64;
         self.log.stats.peak_modules = self.log.stats.peak_modules.max(self.world.tree.len() as u64);
         Ok(())
+    }
+
+    /// Notes the algebraic values of a module that is replaced. By the variables in `self.scratch`.
+    fn note_values(&mut self, id: ModuleId) {
+        let Some(state) = self.world.state(id) else { return };
+        let Some((rule, solve)) = state.rule.get().zip(state.solve.get()) else { return };
+        let algebraic = &self.setup.model.rules[rule].solves[solve].algebraic;
+        let kept = algebraic.of.iter().enumerate().filter(|(place, _)| !algebraic.is_lazy(*place));
+        let values = kept.map(|(_, &parameter)| self.scratch.variables[parameter]);
+        self.events.replaced_values.extend(values);
     }
 
     /// The residual of the production of a materialised module. By the variables in `self.scratch`.

@@ -142,14 +142,21 @@ impl EventStage<'_, '_> {
     fn take_over(&mut self, solved: &Solved) -> Changed {
         let Solved { places, before, values } = solved;
         let mut changed = Changed::default();
+        let error = JUMP * self.setup.settings.tolerance;
         for ((of, &before), &value) in places.iter().zip(before).zip(values) {
             let (id, _) = of.owner(&self.world.tree);
             let state = self.world.state(id).expect("wanted");
             let in_question = self.events.ready.contains(&id) && state.open.is_none();
             let elsewhere = in_question || state.open.as_ref().is_some_and(|open| open.flow.is_none());
+            // A successor has the value that was followed up to the instant, which may have met a level, and not one that differs from it by an error.
+            let is_close = |other: &f64| (value - other).abs() <= error * value.abs().max(1.0);
+            let followed =
+                self.events.replaced_values.iter().copied().filter(|other| elsewhere && is_close(other));
+            let value =
+                followed.min_by(|a, b| (value - a).abs().total_cmp(&(value - b).abs())).unwrap_or(value);
             let size = value.abs().max(before.abs()).max(1.0);
             let step = (value - before).abs();
-            let jumps = step > JUMP * self.setup.settings.tolerance * size;
+            let jumps = step > error * size;
             if !(jumps || elsewhere && value.to_bits() != before.to_bits()) {
                 continue;
             }

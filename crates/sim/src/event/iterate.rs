@@ -88,6 +88,7 @@ impl EventStage<'_, '_> {
             self.events.firing = firing;
         }
         self.events.met.clear();
+        self.events.replaced_values.clear();
         self.events.is_after = false;
         self.neighbours.end_instant();
         self.finish_transitions();

@@ -95,6 +95,8 @@ pub struct Events {
     choices: usize,
     /// Parameters that meet levels at the instant, of modules that others look at: the module, the number of the parameter, the level.
     met: Vec<(ModuleId, usize, f64)>,
+    /// Algebraic values of modules that were replaced at the instant, as they were followed.
+    replaced_values: Vec<f64>,
     /// What jumps at the instant has jumped: a production has been applied that holds just after it only.
     is_after: bool,
     /// Productions that are known to apply.
