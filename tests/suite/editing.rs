@@ -7,6 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use dlsys::diagnostic::Source;
+use dlsys::session::Session;
 use dlsys::syntax::{format::format, parse, print};
 use proptest::prelude::*;
 
@@ -41,6 +42,20 @@ fn the_layout_of_every_model_is_canonical_once_and_means_the_same() {
         assert_eq!(comments(&once), comments(&text), "{}", path.display());
     }
     assert!(parsed > 150, "{parsed}");
+}
+
+/// `dlsys check` has nothing to say of a model that people begin from.
+#[test]
+fn no_model_has_a_warning() {
+    let part = repository("models/barley/organs.dls"); // has no initial string: it is included
+    let mut whole = 0;
+    for path in models().into_iter().filter(|path| path.starts_with(repository("models")) && *path != part) {
+        let session = Session::open(&path, &[]).unwrap_or_else(|refused| panic!("{refused}"));
+        let warnings: String = session.warnings.iter().map(|d| d.render(&session.source, false)).collect();
+        assert!(warnings.is_empty(), "{warnings}");
+        whole += 1;
+    }
+    assert!(whole > 150, "{whole}");
 }
 
 fn comments(text: &str) -> Vec<&str> {
