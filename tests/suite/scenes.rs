@@ -206,6 +206,19 @@ fn plants_are_as_large_as_their_third_parameter_says() {
     assert!(message.contains("has the size of its model") && message.contains("main.dls:2:"), "{message}");
 }
 
+/// A plant of half a metre after five minutes would be five metres high after five seconds.
+#[test]
+fn other_units_of_a_plant_are_told() {
+    let plant =
+        "units length 0.1, time 60\ninitial string: A(0)\nA(x): solve dx/dt = 1\ninterpret A(x): F(x)\n";
+    let scene = |units: &str| format!("{units}plant @P from \"plant.dls\"\ninitial string: @P(0)\n");
+    let warnings = |units: &str| {
+        let folder = folder(&[("plant.dls", plant), ("scene.dls", &scene(units))]);
+        open(folder.path(), "scene.dls").warnings.len()
+    };
+    assert_eq!([warnings(""), warnings("units length 0.1, time 60\n")], [1, 0]);
+}
+
 #[test]
 fn surroundings_follow_time() {
     let text = "light cos(t), 1, 0\nsky \"#001122\", \"#fff\"\ncamera at 0, 1, 5 + t towards 0, 1, 0 angle 30\nground -0.5\n\

@@ -250,9 +250,9 @@ fn explain_says_what_makes_stems_work() {
 fn explain_tells_stems_that_act_on_growth_and_those_of_plants() {
     let snapping = "tissue wood = stiffness 1e9, density 500, damping 0.1\nwind 1, 0, 0 speed 3\n\
         initial string: @E(wood) S\nS: if strain >= 0.1 produce F\ninterpret S: !(0.01) F(1)\nframes 0 .. 4 step 1\n";
-    let meadow = "units length 0.1, time 1\nwind 0, 0, 1 speed 2 + t\nplant @Grass from \"gusts.dls\"\n\
+    let meadow = "units length 0.1, time 2\nwind 0, 0, 1 speed 2 + t\nplant @Grass from \"gusts.dls\"\n\
         initial string: @Grass\nframes 0 .. 3 step 1\n";
-    let garden = "plant @Meadow from \"meadow.dls\"\ninitial string: @Meadow\nframes 0 .. 3 step 1\n";
+    let garden = "units length 0.1, time 2\nplant @Meadow from \"meadow.dls\"\ninitial string: @Meadow\nframes 0 .. 3 step 1\n";
     let folder = folder(&[
         ("snapping.dls", snapping),
         ("gusts.dls", GUSTS),

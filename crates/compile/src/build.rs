@@ -262,6 +262,7 @@ impl<'d> Parts<'d> {
         scene_checks::tissues(&model, &all, &places.materials, diagnostics);
         scene_checks::gases(&model, &all, &places.materials, diagnostics);
         scene_checks::gases_of_plants(&model, diagnostics);
+        scene_checks::units_of_plants(&model, diagnostics);
         scene_checks::soil(&model, diagnostics);
         scene_checks::plants_as_bodies(&model, diagnostics);
         sheets::modules(&model, &all, diagnostics);

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use dlsys_diagnostic::{Diagnostic, Severity, Span};
-use dlsys_model::{DETACH, ELASTIC, GROUND, Kind, KindId, Model, SOURCE, Soil};
+use dlsys_model::{DETACH, ELASTIC, GROUND, Kind, KindId, Model, SOURCE, Soil, Units};
 use dlsys_syntax::foreign_syntax;
 
 /// The argument of a module that names a tissue or a gas, if it is a constant.
@@ -187,6 +187,31 @@ pub fn gases_of_plants(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
                 break;
             }
         }
+    }
+}
+
+/// Warns of plants of other models whose lengths or times are other units than those of the scene: numbers are taken as they are.
+pub fn units_of_plants(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
+    let Units { length, time } = model.scenery.units;
+    for plant in &model.scenery.plants {
+        let own = plant.model.scenery.units;
+        if own == Units::default() || own == model.scenery.units {
+            continue;
+        }
+        diagnostics.push(
+            Diagnostic::warning(format!("the plant `{}` has other units than the scene", plant.name))
+                .at(
+                    plant.span,
+                    format!(
+                        "there a length of 1 is {} m and a time of 1 is {} s, here {length} m and {time} s",
+                        own.length, own.time
+                    ),
+                )
+                .help(format!(
+                    "its numbers are taken for lengths and times of the scene: write `units length {}, time {}` here, too",
+                    own.length, own.time
+                )),
+        );
     }
 }
 
