@@ -109,6 +109,16 @@ impl Dense {
         }
     }
 
+    /// The same; at the ends, where searches begin and end, without a computation.
+    #[inline]
+    pub fn value_or_end(&self, component: usize, position: f64) -> f64 {
+        match self.of(component) {
+            [first, ..] if position == 0.0 => *first,
+            [.., last] if position == 1.0 => *last,
+            _ => self.value(component, position),
+        }
+    }
+
     fn value_of_any_degree(&self, component: usize, position: f64) -> f64 {
         let c = self.of(component);
         if let Ok(c) = c.try_into() {

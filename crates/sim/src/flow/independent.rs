@@ -96,6 +96,8 @@ struct Independent<'a> {
     offset: f64,
     /// The index of `t` among the variables; `age` is the next.
     time: usize,
+    /// Whether the rates read these.
+    clocks: [bool; 2],
     /// `t` and `age` at the start of the step.
     t: f64,
     age: f64,
@@ -114,18 +116,25 @@ impl<'a> Independent<'a> {
     ) -> Independent<'a> {
         y.clear();
         let own = world.tree.parameters(state.id);
-        if rule.aggregates.is_empty() {
-            // Those that move, and the times, are filled in for each evaluation.
+        let context = state.context.context();
+        if !rule.aggregates.is_empty() {
+            world.variables(rule, state.id, &state.context, from, &mut variables);
+        } else if !context.is_empty() {
             variables.clear();
             variables.extend_from_slice(own);
-            state.context.context().iter().for_each(|module| world.values(*module, from, &mut variables));
-            variables.resize(rule.variables, 0.0);
-        } else {
-            world.variables(rule, state.id, &state.context, from, &mut variables);
-            variables[..own.len()].copy_from_slice(own);
+            context.iter().for_each(|module| world.values(*module, from, &mut variables));
+        }
+        // What programs leave behind the variables stays: there is room for it then.
+        let count = rule.variables + state.switches.len();
+        if variables.len() < count {
+            variables.resize(count, 0.0);
+        }
+        // Those that move, and the times, are filled in for each evaluation.
+        variables[..own.len()].copy_from_slice(own);
+        for (place, &on) in variables[rule.variables..].iter_mut().zip(&state.switches) {
+            *place = f64::from(u8::from(on));
         }
         let (t, age) = (from.to_f64(), from.since(world.tree.birth(state.id)));
-        variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
         let solve = &rule.solves[state.solve.get().expect("numeric trajectories have equations")];
         let program = if state.numeric_only { &solve.rates } else { &solve.numeric_rates };
         let mut numeric: SmallVec<[usize; 4]> = smallvec::smallvec![0; program.outputs()];
@@ -142,7 +151,9 @@ impl<'a> Independent<'a> {
             }
         }
         let (offset, time) = (from.since(state.since), rule.time_variable());
-        Independent { solve, program, variables, numeric, formulas, offset, time, t, age, scratch }
+        let [is_timed, reads_age] = [time, time + 1].map(|clock| program.reads().contains(&clock));
+        let clocks = [is_timed, reads_age];
+        Independent { solve, program, variables, numeric, formulas, offset, time, clocks, t, age, scratch }
     }
 }
 
@@ -236,11 +247,11 @@ impl Rates for Independent<'_> {
     }
 
     fn is_timed(&self) -> bool {
-        self.program.reads().contains(&self.time)
+        self.clocks[0]
     }
 
     fn reads_clock(&self) -> bool {
-        self.is_timed() || self.program.reads().contains(&(self.time + 1))
+        self.clocks.contains(&true)
     }
 }
 
@@ -366,7 +377,7 @@ impl FlowStage<'_, '_> {
         let rule = &self.setup.model.rules[index];
         let solve = &rule.solves[solve];
         let mut y = std::mem::take(&mut self.flows.y);
-        let variables = std::mem::take(&mut self.scratch.variables);
+        let variables = std::mem::take(&mut self.flows.registers);
         let scratch = std::mem::take(&mut self.scratch.registers);
         let mut system = Independent::new(self.world, state, rule, from, variables, scratch, &mut y);
         let integrator = &mut self.flows.independent;
@@ -413,7 +424,7 @@ impl FlowStage<'_, '_> {
                 _ => break step,
             }
         };
-        (self.scratch.variables, self.scratch.registers) = (system.variables, system.scratch);
+        (self.flows.registers, self.scratch.registers) = (system.variables, system.scratch);
         self.flows.y = y;
         step
     }

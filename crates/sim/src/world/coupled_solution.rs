@@ -238,7 +238,7 @@ impl<'c> DenseComponent<'c> {
     }
 
     pub fn value(&self, position: f64) -> f64 {
-        self.dense.value(self.component, self.position(position))
+        self.dense.value_or_end(self.component, self.position(position))
     }
 
     /// The value at the start and its rate, per unit of position.
