@@ -435,8 +435,9 @@ impl Program {
                 }
             }
         }
-        for (value, &register) in out.iter_mut().zip(&self.outputs) {
-            *value = registers[register as usize];
+        let out = &mut out[..self.outputs.len()];
+        for (place, &register) in self.outputs.iter().enumerate() {
+            out[place] = registers[register as usize];
         }
     }
 

@@ -143,10 +143,9 @@ impl Plain {
 
     /// Carries out all instructions of a program: the same numbers as in their long form.
     pub fn run(&self, program: &Program, registers: &mut [f64; REGISTERS]) {
-        for (short, instruction) in self.code.iter().zip(&program.code) {
-            let r = &*registers;
-            let [a, b, c] = [short.a, short.b, short.c].map(usize::from);
-            let x = short.x;
+        for (place, short) in self.code.iter().enumerate() {
+            let (r, x) = (&*registers, short.x);
+            let (a, b, c) = (usize::from(short.a), usize::from(short.b), usize::from(short.c));
             let value = match short.operation {
                 Operation::Constant => x,
                 Operation::Add => r[a] + r[b],
@@ -172,7 +171,7 @@ impl Plain {
                 Operation::Sine => r[a].sin(),
                 Operation::Cosine => r[a].cos(),
                 Operation::Select => f64::select(r[c], r[a], r[b]),
-                Operation::Other => program.value(*instruction, &r[..]).1,
+                Operation::Other => program.value(program.code[place], &r[..]).1,
             };
             registers[usize::from(short.to)] = value;
         }

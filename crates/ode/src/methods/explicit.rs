@@ -285,7 +285,8 @@ impl Workspace {
     /// An estimate of the step times the largest rate of decay: two states at the end of the step and the
     /// difference of their rates (Hairer and Wanner 1996, IV.2).
     fn stiffness(&self, tableau: &Tableau, h: f64) -> f64 {
-        let [a, b] = [1, 2].map(|before| &self.k[tableau.stages - before][..self.end.len()]);
+        let (n, last) = (self.end.len(), tableau.stages - 1);
+        let (a, b) = (self.k[last].head(n), self.k[last - 1].head(n));
         let square = |x: &[f64], y: &[f64]| columns::distance(x, y);
         let distance = square(&self.end, &self.other_end);
         if distance > 0.0 { h * (square(a, b) / distance).sqrt() } else { 0.0 }

@@ -11,12 +11,14 @@ use crate::world::coupled_solution::DenseComponent;
 use crate::world::path::{Path, around};
 use dlsys_expr::{Binary, Dual, Interval, Value};
 use dlsys_model::Sign;
-use dlsys_ode::{Function, first_root};
+use dlsys_ode::{Dense, Function, MAX_DEGREE, first_root};
 
 /// The difference of an atom whose sides are an integrated parameter of the module and a number: the same bits as those of
 /// [`Difference`], without all that the rule's other variables take.
 pub(super) struct LevelDifference<'p> {
     along: DenseComponent<'p>,
+    /// Its coefficients, if they are those of the highest degree.
+    coefficients: Option<&'p [f64; MAX_DEGREE + 1]>,
     level: f64,
     /// The parameter is the left side.
     is_left: bool,
@@ -30,9 +32,21 @@ impl<'p> LevelDifference<'p> {
         let (variable, is_left) = (left.or(right)?, left.is_some());
         let level = sides.constant_output(2 * atom + usize::from(is_left))?;
         let stretch = path.world.stretch / path.h;
-        Some(LevelDifference { along: path.dense_component(variable)?, level, is_left, stretch })
+        let along = path.dense_component(variable)?;
+        let coefficients = along.coefficients().try_into().ok();
+        Some(LevelDifference { along, coefficients, level, is_left, stretch })
     }
 
+    /// The value of the parameter.
+    #[inline]
+    fn value_along(&self, at: f64) -> f64 {
+        match self.coefficients {
+            Some(coefficients) if at > 0.0 && at < 1.0 => Dense::at(coefficients, self.along.position(at)),
+            _ => self.along.value(at),
+        }
+    }
+
+    #[inline]
     fn of<T: Value>(&self, x: T) -> T {
         let level = T::constant(self.level);
         if self.is_left { T::binary(Binary::Sub, x, level) } else { T::binary(Binary::Sub, level, x) }
@@ -44,8 +58,9 @@ impl Function for LevelDifference<'_> {
         self.of(self.along.over(lo, hi))
     }
 
+    #[inline]
     fn value(&mut self, at: f64) -> f64 {
-        self.of(self.along.value(at))
+        self.of(self.value_along(at))
     }
 
     fn stretch(&self) -> f64 {
@@ -78,7 +93,7 @@ impl LevelDifference<'_> {
     /// Half the width of the band around zero at a position, as far as the polynomial errs, given its bounds up to there; see
     /// [`CrossingDetector::noise`].
     fn noise(&self, at: f64, before: Interval) -> f64 {
-        let value = around(self.along.value(at), self.along.error_of(before.magnitude()));
+        let value = around(self.value_along(at), self.along.error_of(before.magnitude()));
         let level = Interval::constant(self.level);
         if self.is_left { half_width(value, level) } else { half_width(level, value) }
     }

@@ -151,8 +151,7 @@ impl<'a> Independent<'a> {
             }
         }
         let (offset, time) = (from.since(state.since), rule.time_variable());
-        let [is_timed, reads_age] = [time, time + 1].map(|clock| program.reads().contains(&clock));
-        let clocks = [is_timed, reads_age];
+        let clocks = [program.reads().contains(&time), program.reads().contains(&(time + 1))];
         Independent { solve, program, variables, numeric, formulas, offset, time, clocks, t, age, scratch }
     }
 }
@@ -168,14 +167,23 @@ impl Independent<'_> {
 
     /// Fills in the variables that move, at a time since the start of the step.
     fn move_to(&mut self, tau: f64, y: &[f64]) {
-        for (&variable, &value) in self.numeric.iter().zip(y) {
-            self.variables[variable] = value;
-        }
-        for &(variable, trajectory, x) in &self.formulas {
-            self.variables[variable] = trajectory.at(x, self.offset + tau);
-        }
+        self.move_components(tau, y);
         self.variables[self.time] = self.t + tau;
         self.variables[self.time + 1] = self.age + tau;
+    }
+
+    /// The same but for the times.
+    #[inline]
+    fn move_components(&mut self, tau: f64, y: &[f64]) {
+        let numeric = &self.numeric[..y.len()];
+        for (component, value) in y.iter().enumerate() {
+            self.variables[numeric[component]] = *value;
+        }
+        if !self.formulas.is_empty() {
+            for &(variable, trajectory, x) in &self.formulas {
+                self.variables[variable] = trajectory.at(x, self.offset + tau);
+            }
+        }
     }
 }
 
@@ -186,8 +194,13 @@ const MANY_ROUNDINGS: f64 = 64.0;
 const MAX_TRIES: usize = 100;
 
 impl Rates for Independent<'_> {
+    #[inline]
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
-        self.move_to(tau, y);
+        if self.clocks == [false; 2] {
+            self.move_components(tau, y);
+        } else {
+            self.move_to(tau, y);
+        }
         self.program.eval_in(&mut self.variables, out);
     }
 

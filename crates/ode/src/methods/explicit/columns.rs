@@ -85,6 +85,9 @@ fn weigh<W: Weights>(
 /// The square of the distance of two states, summed in several parts side by side.
 pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     const PARTS: usize = 8;
+    if let ([a], [b]) = (a, b) {
+        return (a - b) * (a - b);
+    }
     let (whole, rest) = a.as_chunks::<PARTS>();
     let (others, other_rest) = b.as_chunks::<PARTS>();
     let mut sums = [0.0; PARTS];

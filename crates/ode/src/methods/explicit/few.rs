@@ -17,10 +17,10 @@ use dlsys_expr::SimTime;
 #[inline(always)]
 fn weighed<W: Weights, const N: usize>(k: &Few) -> [f64; N] {
     let mut sums = [0.0; N];
-    for (weight, k) in W::WEIGHTS.iter().zip(k) {
+    for (stage, weight) in W::WEIGHTS.iter().enumerate() {
         if *weight != 0.0 {
             for j in 0..N {
-                sums[j] += weight * k.0[j];
+                sums[j] += weight * k[stage].0[j];
             }
         }
     }
@@ -29,8 +29,19 @@ fn weighed<W: Weights, const N: usize>(k: &Few) -> [f64; N] {
 
 /// The state at which the rates of a stage are taken.
 fn combine<W: Weights, const N: usize>(from: &[f64; N], k: &Few, h: f64) -> [f64; N] {
-    let sums = weighed::<W, N>(k);
-    std::array::from_fn(|j| from[j] + h * sums[j])
+    let mut state = weighed::<W, N>(k);
+    for j in 0..N {
+        state[j] = from[j] + h * state[j];
+    }
+    state
+}
+
+/// The first values of a list.
+#[inline(always)]
+fn first<const N: usize>(values: &[f64]) -> [f64; N] {
+    let mut first = [0.0; N];
+    first.copy_from_slice(&values[..N]);
+    first
 }
 
 /// Calls a method of the workspace for the number of components.
@@ -64,7 +75,7 @@ impl Workspace {
         tolerance: f64,
     ) -> (f64, f64) {
         let (Step { y, h, .. }, tableau) = (step, P::TABLEAU);
-        let from: [f64; N] = std::array::from_fn(|j| y[j]);
+        let from = first::<N>(y);
         let (mut least, mut greatest, mut state) = (from, from, from);
         self.few[0].0[..N].copy_from_slice(self.k[0].head(N));
         for i in 1..tableau.stages {
@@ -115,9 +126,12 @@ impl Workspace {
 
     /// The estimated errors of the components at the end of the step, with their signs.
     fn estimates_of_few<P: Pair, const N: usize>(&self, h: f64) -> [f64; N] {
-        let high = weighed::<EstimateOf<P, 0>, N>(&self.few);
+        let mut errors = weighed::<EstimateOf<P, 0>, N>(&self.few);
         let low = weighed::<EstimateOf<P, 1>, N>(&self.few);
-        std::array::from_fn(|j| join::<P>(h * high[j], h * low[j]))
+        for j in 0..N {
+            errors[j] = join::<P>(h * errors[j], h * low[j]);
+        }
+        errors
     }
 
     /// The estimated error of one of few components.
@@ -150,7 +164,7 @@ impl Workspace {
         end: Option<SimTime>,
     ) -> Dense {
         let (Step { y, start, h }, tableau) = (step, P::TABLEAU);
-        let from: [f64; N] = std::array::from_fn(|j| y[j]);
+        let from = first::<N>(y);
         let (mut least, mut greatest) = (from, from);
         for i in tableau.stages..tableau.a.len() {
             let state = for_stage!(i, P, combine, &from, &self.few, h);
@@ -166,7 +180,7 @@ impl Workspace {
                 self.reached[1][j] = self.reached[1][j].max(greatest[j]);
             }
         }
-        let to: [f64; N] = std::array::from_fn(|j| self.end[j]);
+        let to = first::<N>(&self.end);
         let mut out = Vec::with_capacity(N * (P::DEGREE + 1));
         P::dense::<N, Row>(&from, &to, &self.few, 0, h, N, &mut out);
         Dense::new(start, end, h, P::DEGREE, out)
