@@ -435,9 +435,13 @@ impl Program {
                 }
             }
         }
-        let out = &mut out[..self.outputs.len()];
-        for (place, &register) in self.outputs.iter().enumerate() {
-            out[place] = registers[register as usize];
+        match (&self.outputs[..], out) {
+            ([register], [value]) => *value = registers[*register as usize],
+            (outputs, out) => {
+                for (value, register) in out.iter_mut().zip(outputs) {
+                    *value = registers[*register as usize];
+                }
+            }
         }
     }
 

@@ -171,9 +171,15 @@ impl Plain {
                 Operation::Sine => r[a].sin(),
                 Operation::Cosine => r[a].cos(),
                 Operation::Select => f64::select(r[c], r[a], r[b]),
-                Operation::Other => program.value(program.code[place], &r[..]).1,
+                Operation::Other => other(program, place, r),
             };
             registers[usize::from(short.to)] = value;
         }
     }
+}
+
+/// The value of an instruction in its long form. It stays out of the loop above, which would set out with all that this may take.
+#[inline(never)]
+fn other(program: &Program, place: usize, registers: &[f64; REGISTERS]) -> f64 {
+    program.value(program.code[place], &registers[..]).1
 }

@@ -108,7 +108,8 @@ impl LevelDifference<'_> {
             TOUCH * finite(value.abs()).max(finite(self.level.abs())) + finite(rate.abs()) * instant;
         let bounds = self.along.bounds();
         let width = self.along.error_of(bounds.magnitude());
-        let Interval { lo, hi, .. } = self.of(Interval { lo: bounds.lo - width, hi: bounds.hi + width, ..bounds });
+        let Interval { lo, hi, .. } =
+            self.of(Interval { lo: bounds.lo - width, hi: bounds.hi + width, ..bounds });
         let may = match sign {
             Sign::Plus => lo.is_nan() || lo <= tolerance,
             _ => hi.is_nan() || hi >= -tolerance,
@@ -134,7 +135,9 @@ impl CrossingDetector {
         if !begins_clear {
             return LevelFinding::Unclear;
         }
-        let Some(root) = first_root(&mut f, 0.0, limit, sign, tolerance) else { return LevelFinding::Unclear };
+        let Some(root) = first_root(&mut f, 0.0, limit, sign, tolerance) else {
+            return LevelFinding::Unclear;
+        };
         if root.at != Sign::Zero || root.after != opposite(sign) {
             return LevelFinding::Unclear;
         }
@@ -142,8 +145,7 @@ impl CrossingDetector {
             let Dual { value: before, rate } = f.along.over(0.0, root.position);
             let noise = f.noise(root.position, before);
             let is_monotonic = !rate.partial && (rate.lo > 0.0 || rate.hi < 0.0);
-            let is_evident =
-                noise <= tolerance || is_monotonic && sign_of(sign) * f.value(limit) < -noise;
+            let is_evident = noise <= tolerance || is_monotonic && sign_of(sign) * f.value(limit) < -noise;
             if !is_evident {
                 return LevelFinding::Unclear;
             }

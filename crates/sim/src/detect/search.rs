@@ -166,8 +166,7 @@ impl Search<'_, '_> {
 
     /// Tracks an atom that compares an integrated parameter with a number, if it changes on the path; false if more has to be asked.
     fn track_level(&mut self, atom: usize) -> bool {
-        let query =
-            LevelQuery { atom, sign: self.now[atom], limit: self.limit, decides: self.decides(atom) };
+        let query = LevelQuery { atom, sign: self.now[atom], limit: self.limit, decides: self.decides(atom) };
         match self.detector.plain_crossing(self.path, query) {
             LevelFinding::Nothing => true,
             LevelFinding::Ahead(tolerance, ahead) => {

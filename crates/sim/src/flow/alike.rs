@@ -95,7 +95,11 @@ impl KnownSteps {
             let both = [&solve.rates, &rule.sides].into_iter().flat_map(|program| program.reads());
             let own = both.clone().filter(|variable| **variable < rule.parameters.len().min(MOST_PARAMETERS));
             let parameters = own.fold(0, |all, parameter| all | 1 << parameter);
-            Reading { parameters, time: both.clone().any(|variable| *variable == rule.time_variable()), misses: 0 }
+            Reading {
+                parameters,
+                time: both.clone().any(|variable| *variable == rule.time_variable()),
+                misses: 0,
+            }
         };
         let readings = (model.rules.iter())
             .map(|rule| rule.solves.iter().map(|solve| reading(rule, solve)).collect())

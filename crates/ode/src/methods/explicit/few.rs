@@ -4,8 +4,8 @@
 //! columns that serve thousands of components ([`columns`](super::columns)), finding the number would take several times longer than what is done with it. Each
 //! component is summed in the same order as there: the bits are the same.
 
-use super::columns::{EstimateOf, Known, Scale, StageOf, Weights, for_stage, join, worse};
 use super::Pair;
+use super::columns::{EstimateOf, Known, Scale, StageOf, Weights, for_stage, join, worse};
 use crate::Rates;
 use crate::column::Row;
 use crate::dense::Dense;
@@ -103,7 +103,11 @@ impl Workspace {
     }
 
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
-    fn error_of_few<P: Pair, const N: usize>(&self, from: &[f64; N], (h, tolerance): (f64, f64)) -> (f64, f64) {
+    fn error_of_few<P: Pair, const N: usize>(
+        &self,
+        from: &[f64; N],
+        (h, tolerance): (f64, f64),
+    ) -> (f64, f64) {
         let scale = Scale::of::<P>(h, tolerance, (self.resolution, self.floor));
         let (mut worst, mut roundest) = (0, 0.0f64);
         let estimates = self.estimates_of_few::<P, N>(h);
