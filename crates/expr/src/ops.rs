@@ -121,6 +121,9 @@ impl Binary {
         [("min", Binary::Min), ("max", Binary::Max), ("atan2", Binary::Atan2)];
 }
 
+/// Registers that a byte can name.
+pub(crate) const REGISTERS: usize = 1 << u8::BITS;
+
 /// A number-like type that a [`Program`](super::Program) can be evaluated in.
 pub trait Value: Copy {
     /// A number, as a value of the type.
@@ -139,6 +142,15 @@ pub trait Value: Copy {
     fn element(array: &Array, index: Self) -> Self;
     /// A part of a field at a time and a place.
     fn field(field: &FieldSlot, part: FieldPart, at: [Self; FIELD_ARGUMENTS]) -> Self;
+
+    /// The registers that the type's own interpreter takes; 0 if it has none.
+    const REGISTERS: usize = 0;
+
+    /// So many registers as plain numbers, if they are: these have an interpreter of their own.
+    #[inline(always)]
+    fn numbers(_registers: &mut [Self]) -> Option<&mut [f64; REGISTERS]> {
+        None
+    }
 }
 
 /// A number less the nearest even one, exactly.
@@ -160,6 +172,13 @@ impl Value for f64 {
     #[inline]
     fn constant(x: f64) -> f64 {
         x
+    }
+
+    const REGISTERS: usize = REGISTERS;
+
+    #[inline(always)]
+    fn numbers(registers: &mut [f64]) -> Option<&mut [f64; REGISTERS]> {
+        registers.first_chunk_mut()
     }
 
     // Interpreters call it in one place each.

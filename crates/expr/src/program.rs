@@ -1,11 +1,14 @@
 //! Compilation of expressions to straight-line code with registers, and its evaluation for one row or many.
 
 mod lanes;
+mod plain;
 
 pub use lanes::{LANES, Lanes};
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
+
+use plain::Plain;
 
 use super::{
     Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Graph, Lookup, Node, NodeId, NodeMap, Part,
@@ -108,6 +111,8 @@ pub struct Program {
     curves: Vec<Arc<Curve>>,
     arrays: Vec<Arc<Array>>,
     fields: Vec<FieldSlot>,
+    /// The code for plain numbers.
+    plain: Option<Plain>,
 }
 
 /// The curves, arrays or fields that a program reads, each once.
@@ -282,7 +287,8 @@ impl Program {
         reads.dedup();
         let Compiler { curves, arrays, fields, registers, .. } = compiler;
         let (curves, arrays, fields, registers) = (curves.all, arrays.all, fields.all, registers as usize);
-        Program { constants, curves, arrays, fields, code, outputs, variables, registers, reads }
+        let plain = Plain::new(&code, registers);
+        Program { constants, curves, arrays, fields, plain, code, outputs, variables, registers, reads }
     }
 
     /// The number of variables that the roots may read.
@@ -415,51 +421,68 @@ impl Program {
     /// Evaluates all roots, as [`Program::eval`] does, with the variables in the first registers, which stay there.
     pub fn eval_in<T: Value>(&self, registers: &mut Scratch<T>, out: &mut [T]) {
         // What earlier evaluations have left in the other registers is overwritten before it is read.
-        if registers.len() < self.registers {
-            registers.resize(self.registers, T::constant(0.0));
+        let places = if self.plain.is_some() { self.registers.max(T::REGISTERS) } else { self.registers };
+        if registers.len() < places {
+            registers.resize(places, T::constant(0.0));
         }
-        let scratch = &mut registers[..self.registers];
-        for &instruction in &self.code {
-            let (to, value) = match instruction {
-                Instruction::Const(to, x) => (to, T::constant(x)),
-                Instruction::Unary(op, to, a) => (to, T::unary(op, scratch[a as usize])),
-                Instruction::Binary(op, to, a, b) => {
-                    (to, T::binary(op, scratch[a as usize], scratch[b as usize]))
+        match (&self.plain, T::numbers(registers)) {
+            (Some(plain), Some(numbers)) => plain.run(self, numbers),
+            _ => {
+                let registers = &mut registers[..self.registers];
+                for &instruction in &self.code {
+                    let (to, value) = self.value(instruction, registers);
+                    registers[to as usize] = value;
                 }
-                Instruction::Left(op, to, x, b) => (to, T::binary(op, T::constant(x), scratch[b as usize])),
-                Instruction::Right(op, to, a, x) => (to, T::binary(op, scratch[a as usize], T::constant(x))),
-                Instruction::Product(op, to, a, [b, c]) => {
-                    let product = T::binary(Binary::Mul, scratch[b as usize], scratch[c as usize]);
-                    (to, T::binary(op, scratch[a as usize], product))
-                }
-                Instruction::Squared(op, to, a, b) => {
-                    (to, T::binary(op, scratch[a as usize], T::unary(Unary::Square, scratch[b as usize])))
-                }
-                Instruction::Scaled(op, to, a, x, b) => {
-                    let product = T::binary(Binary::Mul, T::constant(x), scratch[b as usize]);
-                    (to, T::binary(op, scratch[a as usize], product))
-                }
-                Instruction::Select(to, c, a, b) => {
-                    (to, T::select(scratch[c as usize], scratch[a as usize], scratch[b as usize]))
-                }
-                Instruction::Curve(curve, part, to, a) => {
-                    (to, T::curve(&self.curves[curve as usize], part, scratch[a as usize]))
-                }
-                Instruction::Piece(curve, part, to, i, a) => {
-                    let (i, a) = (scratch[i as usize], scratch[a as usize]);
-                    (to, T::piece(&self.curves[curve as usize], part, i, a))
-                }
-                Instruction::Element(array, to, i) => {
-                    (to, T::element(&self.arrays[array as usize], scratch[i as usize]))
-                }
-                Instruction::Field(field, part, to, at) => {
-                    (to, T::field(&self.fields[field as usize], part, at.map(|of| scratch[of as usize])))
-                }
-            };
-            scratch[to as usize] = value;
+            }
         }
-        for (value, &register) in out.iter_mut().zip(&self.outputs) {
-            *value = scratch[register as usize];
+        match (&self.outputs[..], out) {
+            ([register], [value]) => *value = registers[*register as usize],
+            (outputs, out) => {
+                for (value, register) in out.iter_mut().zip(outputs) {
+                    *value = registers[*register as usize];
+                }
+            }
+        }
+    }
+
+    /// The destination of an instruction, and the value that it gives it.
+    #[inline(always)]
+    fn value<T: Value>(&self, instruction: Instruction, registers: &[T]) -> (Register, T) {
+        match instruction {
+            Instruction::Const(to, x) => (to, T::constant(x)),
+            Instruction::Unary(op, to, a) => (to, T::unary(op, registers[a as usize])),
+            Instruction::Binary(op, to, a, b) => {
+                (to, T::binary(op, registers[a as usize], registers[b as usize]))
+            }
+            Instruction::Left(op, to, x, b) => (to, T::binary(op, T::constant(x), registers[b as usize])),
+            Instruction::Right(op, to, a, x) => (to, T::binary(op, registers[a as usize], T::constant(x))),
+            Instruction::Product(op, to, a, [b, c]) => {
+                let product = T::binary(Binary::Mul, registers[b as usize], registers[c as usize]);
+                (to, T::binary(op, registers[a as usize], product))
+            }
+            Instruction::Squared(op, to, a, b) => {
+                (to, T::binary(op, registers[a as usize], T::unary(Unary::Square, registers[b as usize])))
+            }
+            Instruction::Scaled(op, to, a, x, b) => {
+                let product = T::binary(Binary::Mul, T::constant(x), registers[b as usize]);
+                (to, T::binary(op, registers[a as usize], product))
+            }
+            Instruction::Select(to, c, a, b) => {
+                (to, T::select(registers[c as usize], registers[a as usize], registers[b as usize]))
+            }
+            Instruction::Curve(curve, part, to, a) => {
+                (to, T::curve(&self.curves[curve as usize], part, registers[a as usize]))
+            }
+            Instruction::Piece(curve, part, to, i, a) => {
+                let (i, a) = (registers[i as usize], registers[a as usize]);
+                (to, T::piece(&self.curves[curve as usize], part, i, a))
+            }
+            Instruction::Element(array, to, i) => {
+                (to, T::element(&self.arrays[array as usize], registers[i as usize]))
+            }
+            Instruction::Field(field, part, to, at) => {
+                (to, T::field(&self.fields[field as usize], part, at.map(|of| registers[of as usize])))
+            }
         }
     }
 

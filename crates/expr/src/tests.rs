@@ -157,6 +157,29 @@ fn outputs_know_what_they_read_and_whether_they_are_numbers() {
     assert_eq!(numbers, [None, Some(2.0), None, None, None]);
 }
 
+/// Plain numbers have an interpreter of their own; derivatives carry the same numbers through the one that all types share.
+#[test]
+fn plain_numbers_are_to_the_bit_those_of_the_common_interpreter() {
+    let (graph, list) = all();
+    let roots: Vec<NodeId> = list.iter().map(|(_, id)| *id).collect();
+    // The last have more registers than a byte can name.
+    for variables in [2, 100, 300] {
+        let program = Program::compile(&graph, &roots, variables);
+        for (x, y) in [(0.3, 0.7), (-1.5, 0.25), (2.0, 2.0), (0.0, -0.0), (1e-9, 1e9), (f64::NAN, 1.0)] {
+            let mut values = vec![0.0; variables];
+            (values[0], values[1]) = (x, y);
+            let duals: Vec<Dual<f64>> = values.iter().map(|x| Dual::constant(*x)).collect();
+            let (mut plain, mut common) = (vec![0.0; roots.len()], vec![Dual::constant(0.0); roots.len()]);
+            program.eval(&values, &mut Vec::new(), &mut plain);
+            program.eval(&duals, &mut Vec::new(), &mut common);
+            for ((plain, common), (name, _)) in plain.iter().zip(&common).zip(&list) {
+                let same = plain.to_bits() == common.value.to_bits() || plain.is_nan() && common.value.is_nan();
+                assert!(same, "{name} at {x}, {y}: {plain}, not {}", common.value);
+            }
+        }
+    }
+}
+
 proptest! {
     #[test]
     fn bounds_hold_every_value(

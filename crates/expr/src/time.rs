@@ -69,6 +69,7 @@ impl SimTime {
 }
 
 /// Sum and rounding error of it (Knuth, TAOCP 2, 4.2.2, theorem B).
+#[inline]
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;
     let part = sum - a;

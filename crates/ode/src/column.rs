@@ -7,6 +7,9 @@ const LINE: usize = 64;
 /// The numbers in a line.
 const IN_LINE: usize = LINE / size_of::<f64>();
 
+/// Most components that are few: those of a module that is integrated alone, as a rule.
+pub(crate) const FEW: usize = 4;
+
 /// A column that grows has room for this part of its numbers more.
 const SPARE: usize = 8;
 
@@ -86,6 +89,26 @@ impl Stage for &mut [f64] {
     #[inline]
     fn at(&self, place: usize) -> f64 {
         self[place]
+    }
+}
+
+/// The rates of few components at a stage; what is behind them means nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Row(pub [f64; FEW]);
+
+impl Deref for Row {
+    type Target = [f64];
+
+    #[inline(always)]
+    fn deref(&self) -> &[f64] {
+        &self.0
+    }
+}
+
+impl Stage for Row {
+    #[inline(always)]
+    fn at(&self, place: usize) -> f64 {
+        self.0[place]
     }
 }
 

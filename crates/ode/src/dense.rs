@@ -109,6 +109,16 @@ impl Dense {
         }
     }
 
+    /// The same; at the ends, where searches begin and end, without a computation.
+    #[inline]
+    pub fn value_or_end(&self, component: usize, position: f64) -> f64 {
+        match self.of(component) {
+            [first, ..] if position == 0.0 => *first,
+            [.., last] if position == 1.0 => *last,
+            _ => self.value(component, position),
+        }
+    }
+
     fn value_of_any_degree(&self, component: usize, position: f64) -> f64 {
         let c = self.of(component);
         if let Ok(c) = c.try_into() {
@@ -125,6 +135,7 @@ impl Dense {
     }
 
     /// The value of a polynomial of the highest degree.
+    #[inline]
     pub fn at(coefficients: &[f64; MAX_DEGREE + 1], position: f64) -> f64 {
         casteljau(coefficients, position)
     }
@@ -177,7 +188,12 @@ impl Dense {
             let Dual { value, rate } = self.departure(component, PLACE);
             return (value, rate);
         };
-        AT_PLACE.map(|weights| weights.iter().zip(c).map(|(w, c)| w * c).sum()).into()
+        let (mut value, mut rate) = (-0.0, -0.0);
+        for i in 0..8 {
+            value += AT_PLACE[0][i] * c[i];
+            rate += AT_PLACE[1][i] * c[i];
+        }
+        (value, rate)
     }
 
     /// Bounds of one component over the whole step: the hull of its coefficients.
@@ -200,22 +216,32 @@ impl Dense {
 
     /// Bounds of a polynomial of the degree of the components and of its rate (per unit of position) from `lo` to `hi`.
     pub fn stretch(&self, c: &mut Coefficients, lo: f64, hi: f64) -> Dual<Interval> {
-        let c = &mut c[..=self.degree];
-        cut(c, lo, hi);
-        let width = hi - lo;
-        let mut rate = Interval::constant(0.0);
-        if self.degree > 0 {
-            let mut slopes: Coefficients = [0.0; MAX_DEGREE + 1];
-            for i in 0..self.degree {
-                slopes[i] = self.degree as f64 * (c[i + 1] - c[i]) / width;
-            }
-            rate = hull(&slopes[..self.degree]);
+        // The degree of most steps has code without loops.
+        match self.degree {
+            MAX_DEGREE => bounds_between(c, lo, hi),
+            degree => bounds_between(&mut c[..=degree], lo, hi),
         }
-        Dual { value: hull(c), rate }
     }
 }
 
+/// Bounds of a polynomial with these coefficients and of its rate (per unit of position) from `lo` to `hi`. The coefficients become those of that stretch.
+#[inline(always)]
+fn bounds_between(c: &mut [f64], lo: f64, hi: f64) -> Dual<Interval> {
+    cut(c, lo, hi);
+    let (degree, width) = (c.len() - 1, hi - lo);
+    let mut rate = Interval::constant(0.0);
+    if degree > 0 {
+        let mut slopes: Coefficients = [0.0; MAX_DEGREE + 1];
+        for i in 0..degree {
+            slopes[i] = degree as f64 * (c[i + 1] - c[i]) / width;
+        }
+        rate = hull(&slopes[..degree]);
+    }
+    Dual { value: hull(c), rate }
+}
+
 /// Restricts a polynomial to the positions from `lo` to `hi` (de Casteljau's subdivision, at `hi` and then at `lo`).
+#[inline(always)]
 fn cut(c: &mut [f64], lo: f64, hi: f64) {
     let degree = c.len() - 1;
     if hi < 1.0 {
@@ -248,10 +274,12 @@ fn casteljau<const N: usize>(coefficients: &[f64; N], position: f64) -> f64 {
 }
 
 /// Exact at both ends, unlike `a + s (b - a)`.
+#[inline(always)]
 fn mix(a: f64, b: f64, s: f64) -> f64 {
     a * (1.0 - s) + b * s
 }
 
+#[inline(always)]
 fn hull(values: &[f64]) -> Interval {
     let mut all = Interval::constant(values[0]);
     for &v in &values[1..] {

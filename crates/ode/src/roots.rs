@@ -66,16 +66,16 @@ pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolera
     let (mut begin, mut stack) = (from, Vec::new());
     loop {
         let end = if begin + stretch < to { begin + stretch } else { to };
-        stack.push((begin, end));
-        let mut pieces = 0;
-        while let Some((lo, hi)) = stack.pop() {
+        let (mut next, mut pieces) = (Some((begin, end)), 0);
+        while let Some((lo, hi)) = next {
             pieces += 1;
-            match search.examine(lo, hi, pieces > MAX_PIECES) {
-                Finding::Nothing => {}
+            next = match search.examine(lo, hi, pieces > MAX_PIECES) {
+                Finding::Nothing => stack.pop(),
                 Finding::Root(root) => return Some(root),
                 Finding::Halve => {
                     let middle = 0.5 * (lo + hi);
-                    stack.extend([(middle, hi), (lo, middle)]);
+                    stack.push((middle, hi));
+                    Some((lo, middle))
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! The working memory that all methods share, and the measurements on a step that need no knowledge of the method.
 
 use crate::Rates;
-use crate::column::Column;
+use crate::column::{Column, Row};
 use crate::one_step::Trial;
 
 /// Errors below the tolerated part of this are ignored, whatever the size of the component, but for what grows from less.
@@ -29,6 +29,9 @@ pub(crate) const PART: usize = 8;
 /// The most stages of a method: those of DOP853 with its dense output.
 pub(crate) const MAX_STAGES: usize = 16;
 
+/// The rates of few components at all stages.
+pub(crate) type Few = [Row; MAX_STAGES];
+
 /// The range of each component among the states at which the rates were evaluated in a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Reached<'s> {
@@ -52,6 +55,10 @@ pub struct Workspace {
     pub(crate) from: Column,
     /// Rates at the stages; the first is that of the start of the step.
     pub(crate) k: Vec<Column>,
+    /// The rates at the stages of the step just tried, where components are few: then [`Workspace::k`] has only those at the ends.
+    pub(crate) few: Few,
+    /// The step just tried is one of few components.
+    pub(crate) is_few: bool,
     /// The state at which the rates of a stage are evaluated.
     pub(crate) stage: Column,
     /// The state of the stage before the last, where that is also at the end of the step.

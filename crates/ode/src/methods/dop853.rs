@@ -172,16 +172,26 @@ pub(super) fn join_estimates(e5: f64, e3: f64) -> f64 {
     if e5.is_finite() & e3.is_finite() { joined } else { f64::INFINITY }
 }
 
-/// Dense output weights applied to the stage rates of some components, side by side.
+/// The four sums of dense output weights applied to the stage rates of some components, side by side.
 ///
-/// The weights sum to zero, so the first rate is taken off before: what is summed is then of the size of the
+/// The weights of each sum to zero, so the first rate is taken off before: what is summed is then of the size of the
 /// variation in the step, and a constant rate gives exactly zero in spite of weights of several hundred.
 #[inline(always)]
-fn dense_sum<const N: usize>(d: &[f64], hk: &[[f64; N]; 16]) -> [f64; N] {
-    let mut sums = [-0.0; N];
-    for (d, k) in d.iter().zip(hk) {
+fn dense_sums<const N: usize>(hk: &[[f64; N]; 16]) -> [[f64; N]; 4] {
+    let mut sums = [[-0.0; N]; 4];
+    let d = DOP853.d;
+    let (d5, d6, d7, d8) = (&d[0][..16], &d[1][..16], &d[2][..16], &d[3][..16]);
+    for i in 0..16 {
+        // Four stages have no weight.
+        if (1..5).contains(&i) {
+            continue;
+        }
         for j in 0..N {
-            sums[j] += d * (k[j] - hk[0][j]);
+            let change = hk[i][j] - hk[0][j];
+            sums[0][j] += d5[i] * change;
+            sums[1][j] += d6[i] * change;
+            sums[2][j] += d7[i] * change;
+            sums[3][j] += d8[i] * change;
         }
     }
     sums
@@ -201,9 +211,7 @@ pub(super) fn dop853_dense<const N: usize>(
     y1: &[f64; N],
     hk: &[[f64; N]; 16],
 ) -> [[f64; 8]; N] {
-    let d = DOP853.d;
-    let (r5, r6) = (dense_sum(d[0], hk), dense_sum(d[1], hk));
-    let (r7, r8) = (dense_sum(d[2], hk), dense_sum(d[3], hk));
+    let [r5, r6, r7, r8] = dense_sums(hk);
     let mut all = [[0.0; 8]; N];
     for (j, all) in all.iter_mut().enumerate() {
         let (y0, y1, first, end) = (y0[j], y1[j], hk[0][j], hk[12][j]);

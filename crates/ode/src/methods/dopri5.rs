@@ -75,7 +75,7 @@ pub(super) fn dopri5_dense<const N: usize>(
     hk: &[[f64; N]; 7],
 ) -> [[f64; 5]; N] {
     let (first, end) = (&hk[0], &hk[6]);
-    // The weights sum to zero, so the first rate is taken off before (as in `dop853::dense_sum`), for all components side by side.
+    // The weights sum to zero, so the first rate is taken off before (as in `dop853::dense_sums`), for all components side by side.
     let mut r5 = [-0.0; N];
     for (d, k) in DOPRI5.d[0].iter().zip(hk) {
         for j in 0..N {

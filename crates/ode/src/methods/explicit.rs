@@ -8,10 +8,11 @@
 //! control), II.5 (pairs) and II.6 (dense output); the same authors' II (1996), section IV.2 (stiffness).
 
 mod columns;
+mod few;
 mod together;
 
 use crate::Rates;
-use crate::column::Stage;
+use crate::column::{FEW, Stage};
 use crate::dense::{Dense, PLACE};
 use crate::one_step::{InteriorError, OneStep, Step, Trial};
 use crate::workspace::{MAX_STAGES, Workspace};
@@ -198,12 +199,15 @@ impl<P: Pair> OneStep for Explicit<P> {
         end: Option<SimTime>,
     ) -> Dense {
         let (Step { y, start, h }, tableau) = (step, P::TABLEAU);
+        if work.is_few {
+            return work.dense_few::<P>(system, step, end);
+        }
         if let Some(parts) = work.parts(system, tableau.a.len() - tableau.stages) {
             return work.dense_together::<P>(parts, step, end);
         }
         work.from[..y.len()].copy_from_slice(y);
         for i in tableau.stages..tableau.a.len() {
-            work.combine_for::<P>(i, y.len(), h);
+            work.combine_for::<P>(i, h);
             work.reach(false);
             work.evaluate(system, tableau.c[i] * h, i);
         }
@@ -242,13 +246,30 @@ impl<P: Pair> OneStep for Explicit<P> {
 impl Workspace {
     /// Tries a step of a pair from a state whose rates are known.
     fn attempt_pair<P: Pair>(&mut self, system: &mut impl Rates, step: Step<'_>, tolerance: f64) -> Trial {
+        self.is_few = false;
         if let Some(parts) = self.parts(system, P::TABLEAU.stages - 1) {
             return self.attempt_together::<P>(parts, step, tolerance);
         }
         let (Step { y, h, .. }, n, tableau) = (step, step.y.len(), P::TABLEAU);
+        let (mut error, rounding) = if (1..=FEW).contains(&n) {
+            self.attempt_few::<P>(system, step, tolerance)
+        } else {
+            self.pass_stages::<P>(system, step);
+            self.largest_error::<P>(n, h, tolerance)
+        };
+        if system.is_algebraic() {
+            let errors: Vec<f64> = (0..y.len()).map(|j| self.estimate::<P>(h, j)).collect();
+            error = error.max(system.algebraic_error(h, &self.end, &errors, tolerance));
+        }
+        self.outcome(error, rounding, tableau.stages - 1)
+    }
+
+    /// Goes through all stages of a step of many components.
+    fn pass_stages<P: Pair>(&mut self, system: &mut impl Rates, Step { y, h, .. }: Step<'_>) {
+        let (n, tableau) = (y.len(), P::TABLEAU);
         self.from[..n].copy_from_slice(y);
         for i in 1..tableau.stages {
-            self.combine_for::<P>(i, n, h);
+            self.combine_for::<P>(i, h);
             self.reach(i == 1);
             self.evaluate(system, tableau.c[i] * h, i);
             if i + 2 == tableau.stages {
@@ -259,18 +280,13 @@ impl Workspace {
                 self.end.copy_from_slice(&self.stage[..n]);
             }
         }
-        let (mut error, rounding) = self.largest_error::<P>(n, h, tolerance);
-        if system.is_algebraic() {
-            let errors: Vec<f64> = (0..y.len()).map(|j| self.estimate::<P>(h, j)).collect();
-            error = error.max(system.algebraic_error(h, &self.end, &errors, tolerance));
-        }
-        self.outcome(error, rounding, tableau.stages - 1)
     }
 
     /// An estimate of the step times the largest rate of decay: two states at the end of the step and the
     /// difference of their rates (Hairer and Wanner 1996, IV.2).
     fn stiffness(&self, tableau: &Tableau, h: f64) -> f64 {
-        let [a, b] = [1, 2].map(|before| &self.k[tableau.stages - before][..self.end.len()]);
+        let (n, last) = (self.end.len(), tableau.stages - 1);
+        let (a, b) = (self.k[last].head(n), self.k[last - 1].head(n));
         let square = |x: &[f64], y: &[f64]| columns::distance(x, y);
         let distance = square(&self.end, &self.other_end);
         if distance > 0.0 { h * (square(a, b) / distance).sqrt() } else { 0.0 }

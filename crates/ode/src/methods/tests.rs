@@ -28,6 +28,56 @@ impl Rates for Growth {
     }
 }
 
+/// Components that do not read one another: y' = (1 + j/8) sin y cos t + t.
+struct Copies;
+
+impl Rates for Copies {
+    fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
+        for (j, (y, out)) in y.iter().zip(out).enumerate() {
+            *out = (1.0 + j as f64 / 8.0) * y.sin() * tau.cos() + tau;
+        }
+    }
+
+    fn couplings(&self) -> Vec<(u32, u32)> {
+        Vec::new()
+    }
+
+    fn partials(&mut self, _: f64, _: &[f64], _: &mut Vec<f64>) {}
+
+    fn modules(&self) -> u64 {
+        1
+    }
+}
+
+/// The end of a step of so many components, with its dense output and their ranges.
+fn step_of(scheme: Scheme, n: usize) -> (Vec<f64>, Dense, [Vec<f64>; 2]) {
+    let (mut work, mut schemes) = (Workspace::default(), Schemes::default());
+    work.provide(n, MAX_STAGES);
+    work.keep_reached(true);
+    let y: Vec<f64> = (0..n).map(|j| 0.3 + 0.2 * j as f64).collect();
+    work.start(&mut Copies, &y).expect("finite");
+    let step = Step { y: &y, start: SimTime::ZERO, h: 0.75 };
+    let tried = schemes.attempt(scheme, &mut work, &mut Copies, step, 1e-6);
+    assert!(matches!(tried, Trial::Done { error, .. } if error > 0.0), "{tried:?}");
+    let dense = schemes.dense(scheme, &mut work, &mut Copies, step, None);
+    (work.end().to_vec(), dense, work.reached.clone())
+}
+
+#[test]
+fn few_components_are_to_the_bit_what_they_are_among_many() {
+    for scheme in [Scheme::Dopri5, Scheme::Dop853] {
+        let (all, dense, reached) = step_of(scheme, 9);
+        for n in 1..=5 {
+            let (few, of_few, range) = step_of(scheme, n);
+            assert_eq!(few, all[..n]);
+            for j in 0..n {
+                assert_eq!(of_few.of(j), dense.of(j), "{scheme:?}, component {j} of {n}");
+                assert_eq!([range[0][j], range[1][j]], [reached[0][j], reached[1][j]]);
+            }
+        }
+    }
+}
+
 /// Largest error at step ends, and in the middle of steps, on [0, 2].
 fn errors(scheme: Scheme, steps: usize) -> (f64, f64) {
     let h = 2.0 / steps as f64;

@@ -19,6 +19,7 @@ use crate::detect::examined::{ExaminedStep, StageRange};
 use crate::trajectory::Trajectory;
 use crate::world::state::State;
 use dlsys_expr::{Interval, Scratch, Smooth, Value};
+use dlsys_tree::ModuleId;
 
 /// What the terms may differ by, times the length of the step, in tolerances: as much as the error of a step may be.
 const SHARE: f64 = 0.1;
@@ -55,15 +56,21 @@ impl CalmTest {
     fn gather(&mut self, step: &ExaminedStep, stages: StageRange) {
         let (world, variables) = (step.world, &mut self.variables);
         variables.clear();
-        for &id in std::iter::once(&step.state.id).chain(step.state.context.context()) {
+        let mut add = |id: ModuleId| {
             let values = world.tree.parameters(id);
             match world.state(id).filter(|state| !state.trajectories.is_empty()) {
-                Some(state) => variables.extend(
-                    (values.iter().zip(&state.trajectories))
-                        .map(|(x, trajectory)| range(step, stages, state, trajectory, *x)),
-                ),
+                Some(state) => {
+                    let trajectories = &state.trajectories[..values.len()];
+                    for (place, x) in values.iter().enumerate() {
+                        variables.push(range(step, stages, state, &trajectories[place], *x));
+                    }
+                }
                 None => variables.extend(values.iter().map(|x| Smooth::constant(*x))),
             }
+        };
+        add(step.state.id);
+        for id in step.state.context.context() {
+            add(*id);
         }
         variables.resize(step.rule.time_variable(), Smooth::constant(0.0));
         let birth = world.tree.birth(step.state.id);

@@ -5,8 +5,8 @@
 //! Elsewhere the difference is bounded by interval arithmetic and its roots are isolated ([`CrossingDetector::root`]),
 //! unless the bounds over the whole path already exclude a change of sign.
 
+use crate::detect::level::LevelDifference;
 use crate::detect::signs::{NEAR, Reach, is_at, opposite, rate_at, reach, sign_of};
-use crate::world::coupled_solution::DenseComponent;
 use crate::world::path::Path;
 use crate::world::state::State;
 use dlsys_expr::{Binary, Dual, Interval, Program, Scratch, Value};
@@ -18,7 +18,7 @@ use dlsys_tree::SimTime;
 pub const TOUCH: f64 = 256.0 * f64::EPSILON;
 
 /// Sides that are this many times larger at the start of a path than in its middle begin at a pole.
-const POLE: f64 = 1e8;
+pub(super) const POLE: f64 = 1e8;
 
 /// Residue that numerical trajectories may leave of zero, relative to the size of the sides or to 1.
 const NOISE: f64 = 1e-10;
@@ -103,46 +103,6 @@ impl Function for Difference<'_, '_> {
 
     fn stretch(&self) -> f64 {
         self.path.world.stretch / self.path.h
-    }
-}
-
-/// The difference of an atom whose sides are an integrated parameter of the module and a number: the same bits as those of
-/// [`Difference`], without all that the rule's other variables take.
-struct LevelDifference<'p> {
-    along: DenseComponent<'p>,
-    level: f64,
-    /// The parameter is the left side.
-    is_left: bool,
-    stretch: f64,
-}
-
-impl<'p> LevelDifference<'p> {
-    fn new(path: &'p Path, atom: usize) -> Option<LevelDifference<'p>> {
-        let sides = &path.rule.sides;
-        let [left, right] = [0, 1].map(|side| sides.variable_output(2 * atom + side));
-        let (variable, is_left) = (left.or(right)?, left.is_some());
-        let level = sides.constant_output(2 * atom + usize::from(is_left))?;
-        let stretch = path.world.stretch / path.h;
-        Some(LevelDifference { along: path.dense_component(variable)?, level, is_left, stretch })
-    }
-
-    fn of<T: Value>(&self, x: T) -> T {
-        let level = T::constant(self.level);
-        if self.is_left { T::binary(Binary::Sub, x, level) } else { T::binary(Binary::Sub, level, x) }
-    }
-}
-
-impl Function for LevelDifference<'_> {
-    fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval> {
-        self.of(self.along.over(lo, hi))
-    }
-
-    fn value(&mut self, at: f64) -> f64 {
-        self.of(self.along.value(at))
-    }
-
-    fn stretch(&self) -> f64 {
-        self.stretch
     }
 }
 
@@ -316,7 +276,7 @@ impl CrossingDetector {
 
     /// The parameter of the module, or of a neighbour, or the time, whose value the condition of a production compares with a level that rests, and the level.
     /// Without it a successor that gets a value at its limit would get a rounding of the limit, perhaps on its other side.
-    fn level_of(&mut self, path: &Path, atom: usize) -> Option<(usize, f64)> {
+    pub(super) fn level_of(&mut self, path: &Path, atom: usize) -> Option<(usize, f64)> {
         if !path.rule.decides_productions(atom) {
             return None;
         }

@@ -1,7 +1,8 @@
 //! Detection: the search of a stretch of time for zero crossings, for doubts about them, and for pulses between stages.
 //!
 //! - [`search`]: the next event of a module on a stretch. Begin here.
-//! - [`crossing`]: the crossings of one atom, by formula or by root isolation
+//! - [`crossing`]: the crossings of one atom, by formula or by root isolation; [`level`]: the same where it compares an integrated
+//!   parameter with a number, as most do
 //! - [`doubt`]: crossings that the error of integration may hide or feign; [`limit`]: those that rounding feigns
 //! - [`quiet`]: a short test that spares most searches
 //! - [`pulse`]: rates that are large between the stages of a step; [`calm`]: a short test that spares most of that;
@@ -12,6 +13,7 @@ pub mod calm;
 pub mod crossing;
 pub mod doubt;
 pub mod examined;
+mod level;
 mod limit;
 pub mod pulse;
 pub mod quiet;

@@ -16,6 +16,7 @@ use smallvec::SmallVec;
 
 use crate::detect::crossing::{Crossing, CrossingDetector, LocationMethod, location_method, reachable};
 use crate::detect::doubt::{AtomQuery, Lookahead};
+use crate::detect::level::{LevelFinding, LevelQuery};
 use crate::detect::limit::Arrival;
 use crate::detect::signs::{matters, produces};
 use crate::world::path::Path;
@@ -133,6 +134,9 @@ impl Search<'_, '_> {
                     if self.detector.keeps_clear(path, crossing, self.now[atom], self.error) {
                         continue;
                     }
+                    if self.track_level(atom) {
+                        continue;
+                    }
                     if !std::mem::replace(&mut measured, true) {
                         self.detector.measure(path);
                     }
@@ -157,6 +161,20 @@ impl Search<'_, '_> {
         if next.is_some() {
             let ahead = Lookahead { next, ..Lookahead::default() };
             self.tracked.push(TrackedAtom { atom, tolerance: f64::NAN, ahead });
+        }
+    }
+
+    /// Tracks an atom that compares an integrated parameter with a number, if it changes on the path; false if more has to be asked.
+    fn track_level(&mut self, atom: usize) -> bool {
+        let query = LevelQuery { atom, sign: self.now[atom], limit: self.limit, decides: self.decides(atom) };
+        match self.detector.plain_crossing(self.path, query) {
+            LevelFinding::Nothing => true,
+            LevelFinding::Ahead(tolerance, ahead) => {
+                let ahead = self.but_for_limits(atom, ahead);
+                self.tracked.push(TrackedAtom { atom, tolerance, ahead });
+                true
+            }
+            LevelFinding::Unclear => false,
         }
     }
 

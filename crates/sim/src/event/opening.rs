@@ -48,7 +48,7 @@ impl EventStage<'_, '_> {
                     self.begin_step();
                     None
                 }
-                Owner::Module(slot) => match self.fire_predicted(slot as usize) {
+                Owner::Module(slot) => match self.fire_known(slot as usize, batch.len() == 1) {
                     Some(firing) => {
                         let id = firing.id;
                         self.events.firing.push(firing);
@@ -238,9 +238,18 @@ impl EventStage<'_, '_> {
 
     /// The production of a module whose event was predicted, with its values moved to the event; None if more has to be examined.
     pub fn fire_predicted(&mut self, slot: usize) -> Option<Firing> {
+        self.fire_known(slot, false)
+    }
+
+    /// The same, also of a module that is integrated alone, if its event is the `only` one of the instant and no module reads another: then there
+    /// are no ties to look for, and no transition to be recorded.
+    fn fire_known(&mut self, slot: usize, only: bool) -> Option<Firing> {
         let state = self.world.states.get(slot)?;
-        if !self.setup.fast_path || state.next.kind != NextKind::Event || state.is_numeric() || state.coupled
-        {
+        if !self.setup.fast_path || state.next.kind != NextKind::Event || state.coupled {
+            return None;
+        }
+        let is_numeric = state.is_numeric();
+        if is_numeric && !(only && self.setup.plain) {
             return None;
         }
         let (id, rule) = (state.id, state.rule.get()?);
@@ -258,6 +267,9 @@ impl EventStage<'_, '_> {
         let produces = &self.setup.model.rules[rule].produces;
         let produce = produces.iter().position(|p| p.guard.judge(at) == Truth::Yes)?;
         let levels: SmallVec<[(usize, f64); 2]> = touched.iter().filter_map(Change::level).collect();
+        if is_numeric {
+            self.flow().learn(id);
+        }
         self.world.rebase_except(id, self.instant.at, &levels);
         Some(Firing::at(id, rule, produce))
     }

@@ -24,6 +24,12 @@ use dlsys_tree::{ModuleId, SimTime};
 
 /// So many steps are kept.
 const PLACES: usize = 1024;
+/// After so many steps of a clause in a row that none had been like, only some are kept and looked for:
+const MANY_MISSES: u32 = PLACES as u32;
+/// so many
+const SAMPLE: u32 = 64;
+/// of so many. Where all lives differ, noting how a module stands takes as long as a few evaluations of its rates.
+const PERIOD: u32 = 1024;
 /// Modules with more parameters are none for which steps are kept: those may be large.
 const MOST_PARAMETERS: usize = 32;
 
@@ -71,6 +77,16 @@ pub struct KnownSteps {
 struct Reading {
     parameters: u32,
     time: bool,
+    /// Steps in a row that no other had been like.
+    misses: u32,
+}
+
+impl Reading {
+    /// Counts a step. False for one that is not worth being looked for.
+    fn is_worth(&mut self) -> bool {
+        self.misses = self.misses.checked_add(1).unwrap_or(MANY_MISSES);
+        self.misses < MANY_MISSES || self.misses % PERIOD < SAMPLE
+    }
 }
 
 impl KnownSteps {
@@ -79,7 +95,11 @@ impl KnownSteps {
             let both = [&solve.rates, &rule.sides].into_iter().flat_map(|program| program.reads());
             let own = both.clone().filter(|variable| **variable < rule.parameters.len().min(MOST_PARAMETERS));
             let parameters = own.fold(0, |all, parameter| all | 1 << parameter);
-            Reading { parameters, time: both.clone().any(|variable| *variable == rule.time_variable()) }
+            Reading {
+                parameters,
+                time: both.clone().any(|variable| *variable == rule.time_variable()),
+                misses: 0,
+            }
         };
         let readings = (model.rules.iter())
             .map(|rule| rule.solves.iter().map(|solve| reading(rule, solve)).collect())
@@ -95,6 +115,12 @@ impl KnownSteps {
     fn get(&self) -> Option<Arc<KnownStep>> {
         let known = self.places.get(KnownSteps::place(self.now.hash))?.as_ref()?;
         (known.standing == self.now).then(|| known.clone())
+    }
+
+    /// Notes that a step has been found.
+    fn note_hit(&mut self, known: &KnownStep) {
+        let clause = known.standing.words[0];
+        self.readings[(clause >> 32) as usize][clause as u32 as usize].misses = 0;
     }
 
     /// Keeps the step of the present module, in the memory of the one whose place it takes.
@@ -134,6 +160,7 @@ impl FlowStage<'_, '_> {
             return Err(false);
         }
         let Some(known) = self.flows.known_steps.get() else { return Err(true) };
+        self.flows.known_steps.note_hit(&known);
         // Steps of one standing at one instant are the same to the last bit.
         let start = known.made.dense.start;
         let moved = |time: SimTime| if from == start { time } else { from.after(time.since(start)) };
@@ -169,7 +196,11 @@ impl FlowStage<'_, '_> {
             return false;
         }
         let KnownSteps { readings, now: Standing { hash, words }, .. } = &mut self.flows.known_steps;
-        let Reading { parameters, time: reads_time } = &readings[index][solve];
+        let reading = &mut readings[index][solve];
+        if !reading.is_worth() {
+            return false;
+        }
+        let Reading { parameters, time: reads_time, .. } = &*reading;
         words.clear();
         words.push((index as u64) << 32 | solve as u64);
         words.push(tree.kind(id).index() as u64);

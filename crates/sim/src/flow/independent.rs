@@ -96,6 +96,8 @@ struct Independent<'a> {
     offset: f64,
     /// The index of `t` among the variables; `age` is the next.
     time: usize,
+    /// Whether the rates read these.
+    clocks: [bool; 2],
     /// `t` and `age` at the start of the step.
     t: f64,
     age: f64,
@@ -114,18 +116,25 @@ impl<'a> Independent<'a> {
     ) -> Independent<'a> {
         y.clear();
         let own = world.tree.parameters(state.id);
-        if rule.aggregates.is_empty() {
-            // Those that move, and the times, are filled in for each evaluation.
+        let context = state.context.context();
+        if !rule.aggregates.is_empty() {
+            world.variables(rule, state.id, &state.context, from, &mut variables);
+        } else if !context.is_empty() {
             variables.clear();
             variables.extend_from_slice(own);
-            state.context.context().iter().for_each(|module| world.values(*module, from, &mut variables));
-            variables.resize(rule.variables, 0.0);
-        } else {
-            world.variables(rule, state.id, &state.context, from, &mut variables);
-            variables[..own.len()].copy_from_slice(own);
+            context.iter().for_each(|module| world.values(*module, from, &mut variables));
+        }
+        // What programs leave behind the variables stays: there is room for it then.
+        let count = rule.variables + state.switches.len();
+        if variables.len() < count {
+            variables.resize(count, 0.0);
+        }
+        // Those that move, and the times, are filled in for each evaluation.
+        variables[..own.len()].copy_from_slice(own);
+        for (place, &on) in variables[rule.variables..].iter_mut().zip(&state.switches) {
+            *place = f64::from(u8::from(on));
         }
         let (t, age) = (from.to_f64(), from.since(world.tree.birth(state.id)));
-        variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
         let solve = &rule.solves[state.solve.get().expect("numeric trajectories have equations")];
         let program = if state.numeric_only { &solve.rates } else { &solve.numeric_rates };
         let mut numeric: SmallVec<[usize; 4]> = smallvec::smallvec![0; program.outputs()];
@@ -142,7 +151,8 @@ impl<'a> Independent<'a> {
             }
         }
         let (offset, time) = (from.since(state.since), rule.time_variable());
-        Independent { solve, program, variables, numeric, formulas, offset, time, t, age, scratch }
+        let clocks = [program.reads().contains(&time), program.reads().contains(&(time + 1))];
+        Independent { solve, program, variables, numeric, formulas, offset, time, clocks, t, age, scratch }
     }
 }
 
@@ -157,14 +167,23 @@ impl Independent<'_> {
 
     /// Fills in the variables that move, at a time since the start of the step.
     fn move_to(&mut self, tau: f64, y: &[f64]) {
-        for (&variable, &value) in self.numeric.iter().zip(y) {
-            self.variables[variable] = value;
-        }
-        for &(variable, trajectory, x) in &self.formulas {
-            self.variables[variable] = trajectory.at(x, self.offset + tau);
-        }
+        self.move_components(tau, y);
         self.variables[self.time] = self.t + tau;
         self.variables[self.time + 1] = self.age + tau;
+    }
+
+    /// The same but for the times.
+    #[inline]
+    fn move_components(&mut self, tau: f64, y: &[f64]) {
+        let numeric = &self.numeric[..y.len()];
+        for (component, value) in y.iter().enumerate() {
+            self.variables[numeric[component]] = *value;
+        }
+        if !self.formulas.is_empty() {
+            for &(variable, trajectory, x) in &self.formulas {
+                self.variables[variable] = trajectory.at(x, self.offset + tau);
+            }
+        }
     }
 }
 
@@ -175,8 +194,13 @@ const MANY_ROUNDINGS: f64 = 64.0;
 const MAX_TRIES: usize = 100;
 
 impl Rates for Independent<'_> {
+    #[inline]
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
-        self.move_to(tau, y);
+        if self.clocks == [false; 2] {
+            self.move_components(tau, y);
+        } else {
+            self.move_to(tau, y);
+        }
         self.program.eval_in(&mut self.variables, out);
     }
 
@@ -236,11 +260,11 @@ impl Rates for Independent<'_> {
     }
 
     fn is_timed(&self) -> bool {
-        self.program.reads().contains(&self.time)
+        self.clocks[0]
     }
 
     fn reads_clock(&self) -> bool {
-        self.is_timed() || self.program.reads().contains(&(self.time + 1))
+        self.clocks.contains(&true)
     }
 }
 
@@ -366,7 +390,7 @@ impl FlowStage<'_, '_> {
         let rule = &self.setup.model.rules[index];
         let solve = &rule.solves[solve];
         let mut y = std::mem::take(&mut self.flows.y);
-        let variables = std::mem::take(&mut self.scratch.variables);
+        let variables = std::mem::take(&mut self.flows.registers);
         let scratch = std::mem::take(&mut self.scratch.registers);
         let mut system = Independent::new(self.world, state, rule, from, variables, scratch, &mut y);
         let integrator = &mut self.flows.independent;
@@ -413,7 +437,7 @@ impl FlowStage<'_, '_> {
                 _ => break step,
             }
         };
-        (self.scratch.variables, self.scratch.registers) = (system.variables, system.scratch);
+        (self.flows.registers, self.scratch.registers) = (system.variables, system.scratch);
         self.flows.y = y;
         step
     }

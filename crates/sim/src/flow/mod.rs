@@ -66,6 +66,8 @@ pub struct Flows {
     pub known_rates: KnownRates,
     trajectories: Vec<Trajectory>,
     y: Vec<f64>,
+    /// The variables and registers of the equations of a module that is integrated alone.
+    registers: Vec<f64>,
 }
 
 impl Flows {
@@ -85,6 +87,7 @@ impl Flows {
             known_rates: KnownRates::default(),
             trajectories: Vec::new(),
             y: Vec::new(),
+            registers: Vec::new(),
         }
     }
 

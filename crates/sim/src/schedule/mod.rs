@@ -179,6 +179,9 @@ impl Schedule {
         {
             return Some(head);
         }
+        if next.is_none() && self.batch.members.is_empty() && self.batch.time == f64::INFINITY {
+            return None;
+        }
         // An event may have been scheduled since that is not later.
         self.return_batch();
         let mut members = std::mem::take(&mut self.batch.members);

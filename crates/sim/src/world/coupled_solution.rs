@@ -233,12 +233,19 @@ impl<'c> DenseComponent<'c> {
         DenseComponent { dense, component, from: dense.position(start), scale }
     }
 
-    fn position(&self, position: f64) -> f64 {
+    /// The position in the dense output.
+    #[inline]
+    pub fn position(&self, position: f64) -> f64 {
         (self.from + self.scale * position).min(1.0)
     }
 
     pub fn value(&self, position: f64) -> f64 {
-        self.dense.value(self.component, self.position(position))
+        self.dense.value_or_end(self.component, self.position(position))
+    }
+
+    /// The coefficients of the dense output.
+    pub fn coefficients(&self) -> &'c [f64] {
+        self.dense.of(self.component)
     }
 
     /// The value at the start and its rate, per unit of position.

@@ -14,6 +14,12 @@ use smallvec::SmallVec;
 /// The rounding error of a value, relative to it.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
+/// A value with its rounding and another error.
+pub fn around(x: f64, more: f64) -> Interval {
+    let width = ROUNDING * x.abs() + more;
+    Interval { lo: x - width, hi: x + width, partial: false }
+}
+
 /// The variables of a module's rule along a stretch of time: positions 0 to 1 of `h` from `start`.
 pub struct Path<'p> {
     pub world: &'p World,
@@ -225,10 +231,6 @@ impl<'p> Path<'p> {
     /// Bounds of the values at a position, given the errors of integration and of rounding.
     pub fn uncertain(&self, position: f64, out: &mut Vec<Interval>) {
         let tau = position * self.h;
-        let around = |x: f64, more: f64| {
-            let width = ROUNDING * x.abs() + more;
-            Interval { lo: x - width, hi: x + width, partial: false }
-        };
         self.each(
             out,
             |x| around(x, 0.0),

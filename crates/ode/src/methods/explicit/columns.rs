@@ -10,9 +10,6 @@ use crate::workspace::{MAX_STAGES, Workspace, part_of_sum};
 use dlsys_wide::Kernel;
 use std::marker::PhantomData;
 
-/// So few components are summed one by one.
-const FEW: usize = 2;
-
 /// Components whose errors are judged at a time: what is in between stays in the nearest cache.
 const TILE: usize = 64;
 
@@ -23,15 +20,15 @@ const NARROW: usize = 32;
 const MANY: usize = 8;
 
 /// The weights of a sum over stages. They are known when this is compiled, so that zeros cost nothing and no loop is left.
-trait Weights {
+pub(super) trait Weights {
     const WEIGHTS: &'static [f64];
 }
 
 /// The weights of the state at which stage `I` is evaluated.
-struct StageOf<P, const I: usize>(PhantomData<P>);
+pub(super) struct StageOf<P, const I: usize>(PhantomData<P>);
 
 /// The weights of error estimate `I`.
-struct EstimateOf<P, const I: usize>(PhantomData<P>);
+pub(super) struct EstimateOf<P, const I: usize>(PhantomData<P>);
 
 impl<P: Pair, const I: usize> Weights for StageOf<P, I> {
     const WEIGHTS: &'static [f64] = row(P::TABLEAU.a, I);
@@ -88,6 +85,9 @@ fn weigh<W: Weights>(
 /// The square of the distance of two states, summed in several parts side by side.
 pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
     const PARTS: usize = 8;
+    if let ([a], [b]) = (a, b) {
+        return (a - b) * (a - b);
+    }
     let (whole, rest) = a.as_chunks::<PARTS>();
     let (others, other_rest) = b.as_chunks::<PARTS>();
     let mut sums = [0.0; PARTS];
@@ -141,7 +141,7 @@ pub(super) struct Tried<'w, K> {
 
 /// What the error of a component is compared with.
 #[derive(Clone, Copy)]
-struct Scale {
+pub(super) struct Scale {
     h: f64,
     tolerance: f64,
     /// The error of a change of the rates, because time is known no better.
@@ -152,24 +152,24 @@ struct Scale {
 
 /// What is known of a component: its values at the start and the end, its rates there and at the second stage, the part of its value that counts
 /// and the error of its rate by rounding of the state.
-struct Known {
-    from: f64,
-    end: f64,
-    departure: f64,
-    second: f64,
-    part: f64,
-    noise: f64,
+pub(super) struct Known {
+    pub from: f64,
+    pub end: f64,
+    pub departure: f64,
+    pub second: f64,
+    pub part: f64,
+    pub noise: f64,
 }
 
 impl Scale {
     /// The scale of a step of this length, with time known to a resolution.
-    fn of<P: Pair>(h: f64, tolerance: f64, (resolution, floor): (f64, f64)) -> Scale {
+    pub fn of<P: Pair>(h: f64, tolerance: f64, (resolution, floor): (f64, f64)) -> Scale {
         Scale { h, tolerance, blur: 4.0 * resolution / P::TABLEAU.c[1], floor }
     }
 
     /// The errors of a component by truncation and by rounding, given the estimate of the former.
     #[inline(always)]
-    fn errors(self, estimate: f64, known: Known) -> (f64, f64) {
+    pub fn errors(self, estimate: f64, known: Known) -> (f64, f64) {
         let Known { from, end, departure, second, part, noise } = known;
         // Relative to where the step begins, and to how far it goes from there at first: what
         // grows from 1e-6 must be known to its own digits. Not to where it ends: beyond an
@@ -186,7 +186,7 @@ impl Scale {
 
 /// The larger of two errors; NaN if one is NaN. Numbers that are not negative have the order of their bits, which wide registers compare sooner.
 #[inline(always)]
-fn worse(a: u64, error: f64) -> u64 {
+pub(super) fn worse(a: u64, error: f64) -> u64 {
     a.max(error.to_bits() & !SIGN)
 }
 
@@ -268,12 +268,6 @@ impl<P: Pair, K: Stage, C: Receiver> Kernel for Polynomials<'_, P, K, C> {
     fn run(self) -> C {
         let Polynomials { k, y, end, h, mut out, .. } = self;
         let n = y.len();
-        if n <= FEW {
-            for (j, (y, end)) in y.iter().zip(end).enumerate() {
-                P::dense::<1, K>(&[*y], &[*end], k, j, h, 1, &mut out);
-            }
-            return out;
-        }
         for first in (0..n).step_by(MANY) {
             if first + MANY > k[0].len() {
                 // A part of the components has no padding behind it.
@@ -317,7 +311,7 @@ macro_rules! for_stage {
             13 => $function::<StageOf<$pair, 13>, _>($($argument),*),
             14 => $function::<StageOf<$pair, 14>, _>($($argument),*),
             15 => $function::<StageOf<$pair, 15>, _>($($argument),*),
-            _ => unreachable!("there are {MAX_STAGES} stages at most, and the first needs no state"),
+            _ => unreachable!("there are no more stages, and the first needs no state"),
         }
     };
 }
@@ -335,13 +329,6 @@ pub(super) fn combine_for<P: Pair, K: Stage>(
 
 fn combine<W: Weights, K: Stage>(from: &[f64], k: &[K; MAX_STAGES], h: f64, state: &mut [f64]) {
     run(state.len(), Combination::<W, K> { from, k, stage: state, h, weights: PhantomData });
-}
-
-/// The same of few components.
-fn combine_few<W: Weights, K: Stage>(from: &[f64], k: &[K; MAX_STAGES], n: usize, h: f64, state: &mut [f64]) {
-    for j in 0..n {
-        state[j] = from[j] + h * weighed::<W>(k, j);
-    }
 }
 
 /// The largest error of a component in a step of several, by truncation and by rounding, in units of what is tolerated.
@@ -365,6 +352,8 @@ pub(super) fn polynomials<P: Pair, K: Stage, C: Receiver>(
     run(y.len(), Polynomials::<P, K, C> { k, y, end, h, out, pair: PhantomData })
 }
 
+pub(super) use for_stage;
+
 impl Workspace {
     /// The dense output of all components, from `y` on, in a step of this length.
     pub(super) fn polynomials<P: Pair>(&self, y: &[f64], h: f64) -> Vec<f64> {
@@ -378,53 +367,34 @@ impl Workspace {
     }
 
     /// The state at which the rates of a stage are taken.
-    pub(super) fn combine_for<P: Pair>(&mut self, stage: usize, n: usize, h: f64) {
+    pub(super) fn combine_for<P: Pair>(&mut self, stage: usize, h: f64) {
         let Workspace { from, stage: state, k, .. } = self;
-        let k = k.first_chunk().expect("all stages");
-        if n <= FEW {
-            for_stage!(stage, P, combine_few, from, k, n, h, state);
-        } else {
-            combine_for::<P, _>(stage, from, k, h, state);
-        }
+        combine_for::<P, _>(stage, from, k.first_chunk().expect("all stages"), h, state);
     }
 
     /// The largest error of a component, in units of what is tolerated, by truncation and by rounding.
     pub(super) fn largest_error<P: Pair>(&self, n: usize, h: f64, tolerance: f64) -> (f64, f64) {
         let scale = Scale::of::<P>(h, tolerance, (self.resolution, self.floor));
-        if n > FEW {
-            let Workspace { from, stage: end, is_sum, noise, .. } = self;
-            let step = Tried { k: self.stages(), from, end, is_sum, noise };
-            return run(n, LargestError::<P, _> { step, n, scale, pair: PhantomData });
-        }
-        let (mut worst, mut roundest) = (0, 0.0f64);
-        for j in 0..n {
-            let is_sum = self.is_sum.get(j).is_some_and(|is_sum| *is_sum);
-            let known = Known {
-                from: self.from.at(j),
-                end: self.stage.at(j),
-                departure: self.k[0].at(j),
-                second: self.k[1].at(j),
-                part: if is_sum { part_of_sum(tolerance) } else { 1.0 },
-                noise: self.noise.get(j).copied().unwrap_or(0.0),
-            };
-            let (error, rounding) = scale.errors(self.estimate::<P>(h, j).abs(), known);
-            worst = worse(worst, error);
-            roundest = roundest.max(rounding);
-        }
-        (f64::from_bits(worst), roundest)
+        let Workspace { from, stage: end, is_sum, noise, .. } = self;
+        let step = Tried { k: self.stages(), from, end, is_sum, noise };
+        run(n, LargestError::<P, _> { step, n, scale, pair: PhantomData })
     }
 
     /// The estimated error of one component at the end of the step, with its sign.
     pub(super) fn estimate<P: Pair>(&self, h: f64, component: usize) -> f64 {
-        let high = h * weighed::<EstimateOf<P, 0>>(&self.k, component);
-        match P::TABLEAU.e.len() {
-            1 => high,
-            _ => {
-                let low = h * weighed::<EstimateOf<P, 1>>(&self.k, component);
-                join_estimates(high, low).copysign(high)
-            }
+        if self.is_few {
+            return self.estimate_of_few::<P>(h, self.end.len(), component);
         }
+        let high = h * weighed::<EstimateOf<P, 0>>(&self.k, component);
+        let low = h * weighed::<EstimateOf<P, 1>>(&self.k, component);
+        join::<P>(high, low)
     }
+}
+
+/// The error of a component with its sign, given the estimates of a pair, of which there is one or there are two.
+#[inline(always)]
+pub(super) fn join<P: Pair>(high: f64, low: f64) -> f64 {
+    if P::TABLEAU.e.len() == 1 { high } else { join_estimates(high, low).copysign(high) }
 }
 
 #[cfg(test)]

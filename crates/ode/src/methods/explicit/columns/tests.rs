@@ -64,8 +64,8 @@ fn check<P: Pair>(mut work: Workspace, n: usize) {
         assert_eq!(bits(&dlsys_wide::run_with(width, all)), bits(&polynomials), "{n}, {width:?}");
     }
     for stage in 1..P::TABLEAU.a.len() {
-        work.combine_for::<P>(stage, n, H);
-        each.iter_mut().for_each(|one| one.combine_for::<P>(stage, 1, H));
+        work.combine_for::<P>(stage, H);
+        each.iter_mut().for_each(|one| one.combine_for::<P>(stage, H));
         let alone: Vec<f64> = each.iter().map(|one| one.stage[0]).collect();
         assert_eq!(bits(&work.stage[..n]), bits(&alone), "stage {stage} of {n}");
     }
@@ -74,7 +74,7 @@ fn check<P: Pair>(mut work: Workspace, n: usize) {
         let k = k.first_chunk().expect("all stages");
         let last = Combination::<StageOf<P, 6>, Column> { from, k, stage, h: H, weights: PhantomData };
         dlsys_wide::run_with(width, last);
-        each.iter_mut().for_each(|one| one.combine_for::<P>(6, 1, H));
+        each.iter_mut().for_each(|one| one.combine_for::<P>(6, H));
         let alone: Vec<f64> = each.iter().map(|one| one.stage[0]).collect();
         assert_eq!(bits(&work.stage[..n]), bits(&alone), "{n}, {width:?}");
     }
