@@ -1,34 +1,40 @@
-//! Scenes of the first pass of a render, kept for the second.
+//! Scenes and strings of the first pass of a render, kept for the second.
 //!
-//! The second pass draws what the first has drawn. Scenes that fit in [`ROOM`] are kept in between; the others are drawn again. Pictures do
-//! not depend on which are kept, because the turtle draws the same to the last bit; scenes that it would draw differently with an accuracy, which
-//! only the second pass knows, are never kept.
+//! The second pass draws what the first has drawn. Scenes that fit in [`ROOM`] are kept in between; of the others, the strings that fit are, and
+//! are drawn again. If a frame is neither, all are simulated again. Pictures do not depend on which are kept, because the turtle draws the same to
+//! the last bit; of scenes that it would draw differently with an accuracy, which only the second pass knows, only strings are kept.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::scene::Scene;
 use crate::sim::Stats;
+use crate::tree::ModuleString;
 
-/// Most bytes of the scenes that are kept. A scene that is alone is kept whatever its size: it is in memory in the second pass as well.
+/// Most bytes of what is kept. A scene or string that is alone is kept whatever its size: it is in memory in the second pass as well.
 const ROOM: usize = 64 << 20;
 
-/// Scenes by frame.
+/// Scenes or strings by frame.
 #[derive(Default)]
 pub struct Album(Mutex<Pages>);
 
 #[derive(Default)]
 struct Pages {
-    scenes: HashMap<usize, Kept>,
+    kept: HashMap<usize, Kept>,
     bytes: usize,
     stats: Option<Stats>,
 }
 
-/// A scene that is kept.
-pub struct Kept {
-    pub scene: Scene,
-    /// Modules of its string, brackets not counted.
-    pub modules: usize,
+/// A scene, or a string to be drawn again.
+enum Content {
+    Scene(Box<Scene>),
+    String(ModuleString),
+}
+
+struct Kept {
+    content: Content,
+    /// Modules of the string, brackets not counted.
+    modules: usize,
 }
 
 impl Album {
@@ -36,16 +42,28 @@ impl Album {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Keeps the scene of one of `count` frames, or gives it back.
-    pub fn keep(&self, index: usize, count: usize, kept: Kept) -> Option<Scene> {
-        let bytes = kept.scene.footprint();
+    /// Keeps the scene of one of `count` frames, or gives it back and keeps its string of so many modules, if there is room.
+    pub fn keep(
+        &self,
+        (index, count): (usize, usize),
+        scene: Scene,
+        (string, modules): (ModuleString, usize),
+    ) -> Option<Scene> {
         let mut pages = self.pages();
-        if kept.scene.lacked_accuracy || (count > 1 && pages.bytes + bytes > ROOM) {
-            return Some(kept.scene);
-        }
-        pages.bytes += bytes;
-        pages.scenes.insert(index, kept);
-        None
+        let mut put = |bytes: usize| {
+            let fits = count <= 1 || pages.bytes + bytes <= ROOM;
+            pages.bytes += if fits { bytes } else { 0 };
+            fits
+        };
+        let (content, scene) = if !scene.lacked_accuracy && put(scene.footprint()) {
+            (Content::Scene(Box::new(scene)), None)
+        } else if put(string.footprint()) {
+            (Content::String(string), Some(scene))
+        } else {
+            return Some(scene);
+        };
+        pages.kept.insert(index, Kept { content, modules });
+        scene
     }
 
     /// Keeps the statistics of the first pass.
@@ -53,24 +71,31 @@ impl Album {
         self.pages().stats = Some(stats);
     }
 
-    /// The statistics, if the scenes of all `count` frames are kept.
+    /// The statistics, if all `count` frames are kept.
     pub fn stats_of_all(&self, count: usize) -> Option<Stats> {
         let pages = self.pages();
-        pages.stats.filter(|_| pages.scenes.len() == count)
+        pages.stats.filter(|_| pages.kept.len() == count)
     }
 
-    /// The number of modules of a frame that is kept.
-    pub fn modules(&self, index: usize) -> Option<usize> {
-        self.pages().scenes.get(&index).map(|kept| kept.modules)
+    /// The string of a frame that is kept, which is empty if its scene is, and the number of its modules.
+    pub fn string(&self, index: usize) -> (ModuleString, usize) {
+        match self.pages().kept.get_mut(&index) {
+            Some(Kept { content: Content::String(string), modules }) => (std::mem::take(string), *modules),
+            Some(Kept { modules, .. }) => (ModuleString::default(), *modules),
+            None => (ModuleString::default(), 0),
+        }
     }
 
     /// Takes the scene of a frame out, if it is kept.
     pub fn take(&self, index: usize) -> Option<Scene> {
-        self.pages().scenes.remove(&index).map(|kept| kept.scene)
+        match self.pages().kept.remove(&index)?.content {
+            Content::Scene(scene) => Some(*scene),
+            Content::String(_) => None,
+        }
     }
 }
 
-/// What a pass does with the scenes of an album.
+/// What a pass does with an album.
 #[derive(Clone, Copy)]
 pub enum Keeping<'a> {
     Nothing,
@@ -93,6 +118,7 @@ impl<'a> Keeping<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::KindId;
     use crate::scene::{MaterialId, Owner, Point, Polygon};
     use crate::tree::Lineage;
 
@@ -105,7 +131,13 @@ mod tests {
     }
 
     fn keep(album: &Album, index: usize, count: usize, scene: Scene) -> bool {
-        album.keep(index, count, Kept { scene, modules: 7 }).is_none()
+        album.keep((index, count), scene, (string(ROOM / 8), 7)).is_none()
+    }
+
+    fn string(parameters: usize) -> ModuleString {
+        let mut string = ModuleString::default();
+        string.push(KindId::OPEN, std::iter::repeat_n(0.5, parameters), 0.0, Lineage::of_axiom(0));
+        string
     }
 
     #[test]
@@ -117,15 +149,22 @@ mod tests {
         assert!(!keep(&album, 3, 6, scene(large)) && !keep(&album, 4, 6, scene(small)), "full");
         album.finish(Stats::default());
         assert!(album.stats_of_all(6).is_none() && album.stats_of_all(3).is_some());
-        assert_eq!((album.modules(2), album.modules(5)), (Some(7), None));
+        assert_eq!([2, 5].map(|index| album.string(index).1), [7, 0]);
         assert!(album.take(2).is_some() && album.take(2).is_none());
         assert!(keep(&Album::default(), 0, 1, scene(large)), "alone");
     }
 
     #[test]
-    fn a_scene_that_an_accuracy_would_change_is_not_kept() {
-        let mut bent = scene(3);
-        bent.lacked_accuracy = true;
-        assert!(!keep(&Album::default(), 0, 1, bent));
+    fn of_a_scene_that_an_accuracy_would_change_the_string_is_kept() {
+        let bent = || Scene { lacked_accuracy: true, ..scene(3) };
+        let album = Album::default();
+        assert!(album.keep((0, 2), bent(), (string(2), 7)).is_some());
+        assert!(album.keep((1, 2), bent(), (string(ROOM / 8), 8)).is_some(), "no room");
+        album.finish(Stats::default());
+        assert!(album.stats_of_all(2).is_none() && album.stats_of_all(1).is_some());
+        let (kept, modules) = album.string(0);
+        assert_eq!((kept.get(0).parameters, modules), (&[0.5, 0.5][..], 7));
+        assert!(album.take(0).is_none() && album.string(1).1 == 0);
+        assert!(!keep(&album, 0, 1, bent()) && album.string(0).0.len() == 1, "alone");
     }
 }

@@ -378,7 +378,8 @@ pub struct ReportArgs {
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = runs)]
     pub runs: usize,
     /// Seconds for the points of all methods, an equal part for each; points that do not fit are left out, and it is said how long they
-    /// would take. What --tolerances, --step-sizes and --slices list is measured in any case, and the runs that all are compared with come on top
+    /// would take. What --tolerances, --step-sizes and --slices list is measured in any case. The runs that all are compared with come on top: where one would
+    /// take longer than a third of S, the report ends at an earlier time, and says so, unless times or points are listed. What bends, falls or gives way has S seconds more
     #[arg(long = "budget", value_name = "S", allow_negative_numbers = true, default_value = "4", value_parser = positive)]
     pub study_budget: f64,
     /// Seconds that a run may take; a point that would take longer, judged from the one before, is left out

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::album::{Album, Keeping, Kept};
+use super::album::{Album, Keeping};
 use super::common::{Clock, Failure, ModelRun};
 use super::events::EventLog;
 use super::parallel;
@@ -40,7 +40,7 @@ impl Frame {
 /// Where the frames of a pass come from.
 enum Origin<'r> {
     Simulation(Box<Simulation<'r>>),
-    /// All scenes are kept from a pass before, which had these statistics.
+    /// All scenes or strings are kept from a pass before, which had these statistics.
     Album(&'r Album, Stats),
 }
 
@@ -92,7 +92,7 @@ impl<'r> FrameSource<'r> {
         let simulation = match &mut self.origin {
             Origin::Simulation(simulation) => simulation,
             Origin::Album(album, _) => {
-                let modules = album.modules(index).unwrap_or(0);
+                let (string, modules) = album.string(index);
                 return Some(Frame { index, time, events: Vec::new(), modules, string: Ok(string) });
             }
         };
@@ -183,9 +183,9 @@ fn play_times<Done: Send>(
         let is_whole = drawn.is_ok();
         let done = drawn.map(|()| work(&frame, &scene));
         let warnings = std::mem::take(&mut scene.warnings);
-        let unkept = match pass.keeping.filled().filter(|_| is_whole) {
-            Some(album) => album.keep(frame.index, count, Kept { scene, modules: frame.modules }),
-            None => Some(scene).filter(|_| !is_kept),
+        let unkept = match (pass.keeping.filled().filter(|_| is_whole), frame.string) {
+            (Some(album), Ok(string)) => album.keep((frame.index, count), scene, (string, frame.modules)),
+            _ => Some(scene).filter(|_| !is_kept),
         };
         pool().extend(unkept);
         (frame.events, warnings, done, before.elapsed())

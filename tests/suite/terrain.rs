@@ -148,8 +148,11 @@ fn ground_alone_is_seen_as_it_is() {
 #[test]
 fn errors_of_ground_are_measured_by_the_width_of_columns_and_by_ticks() {
     let text = CONE.replace("cell 0.01", "cell 0.02");
-    let study =
-        dlsys::study::soil_study(&session(&text), &[0.5, 1.0], Settings::default(), 60.0, &mut |_| ());
+    let allowance = dlsys::study::Allowance { run: 60.0, all: 600.0, may_shorten: false };
+    let of = |text: &str, times: &[f64]| {
+        dlsys::study::soil_study(&session(text), times, Settings::default(), allowance, &mut |_| ())
+    };
+    let study = of(&text, &[0.5, 1.0]);
     let study = study.expect("runs").expect("ground of soil");
     for points in [&study.by_cell, &study.by_tick] {
         let outcomes: Vec<_> = points.iter().map(|point| point.result.clone().expect("a run")).collect();
@@ -163,8 +166,7 @@ fn errors_of_ground_are_measured_by_the_width_of_columns_and_by_ticks() {
     assert!(table.contains("misplaced") && table.contains("the reference"), "{table}");
     // Rules that read the ground would grow otherwise on other columns.
     let reads = CONE.replace("F(0.01)", "A(0)") + "A(y): solve dy/dt = ground(0, 0)\n";
-    let none = dlsys::study::soil_study(&session(&reads), &[0.5], Settings::default(), 60.0, &mut |_| ());
-    assert!(none.expect("nothing to run").is_none());
+    assert!(of(&reads, &[0.5]).expect("nothing to run").is_none());
 }
 
 /// The pieces of ground that a file shows, against the ground itself at a tick: the largest distance of a point of one from the other, beside the ball.

@@ -11,6 +11,7 @@
 //! - `reference`: the run against which a method is judged, and an estimate of its error.
 //! - `study`: all points of all methods of a model; `order`: the observed order of convergence.
 //! - `table`, `files`, `plot`: a study as text, as CSV and JSON, and as a picture; `axis`, `diagram`: parts that plots share.
+//! - `allowance`: the time that a study may take.
 //! - `spread`, `band`: the distribution of measures over many specimens, as tables and as a plot.
 //! - `verify`: a run computed again in an independent way.
 //! - `stems`, `passive`, `soils`: error against work for stems that bend, for what falls and hangs, and for ground that gives way; `surroundings`, `falls`, `gases`, `sheets`, `grounds`: exact cases and
@@ -22,6 +23,7 @@
 
 #![warn(missing_docs)]
 
+mod allowance;
 mod axis;
 mod band;
 mod case;
@@ -50,6 +52,7 @@ mod surroundings;
 mod table;
 mod verify;
 
+pub use allowance::Allowance;
 pub use axis::LinearAxis;
 pub use band::band_svg;
 pub use case::{Case, Expectation, PlainModule, Within};

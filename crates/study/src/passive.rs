@@ -11,12 +11,17 @@ use dlsys_session::{Nursery, Session};
 use dlsys_sim::{BendSettings, Settings, brief};
 use dlsys_tree::ModuleString;
 
+use super::allowance::{Allowance, Purse, Stopwatch};
 use super::stems::relative_distance;
 use super::table::Table;
 
 /// Tolerances of a study, and that of the reference.
 const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
 const REFERENCE: f64 = 1e-6;
+/// The part of the time for the study that its first run may take, where it may end at an earlier time.
+const FIRST: f64 = 0.1;
+/// How much longer a run takes than the one with ten times the tolerance, at least.
+const MORE: f64 = 1.5;
 /// Most points of a surface that are compared.
 const MOST_OF_A_SURFACE: usize = 64;
 
@@ -41,9 +46,11 @@ pub struct PassiveStudy {
     pub seconds: f64,
     /// Number of times at which points are compared.
     pub times: usize,
+    /// The last of them.
+    pub last: f64,
 }
 
-/// Runs a scene at each tolerance. `None` if nothing in it falls, and no sheet hangs. Runs that take longer than `limit` seconds are left out.
+/// Runs a scene at each tolerance. `None` if nothing in it falls, and no sheet hangs. Runs that would take longer than what is allowed are left out.
 ///
 /// # Errors
 /// The reason why no run comes to the last time.
@@ -51,7 +58,7 @@ pub fn passive_study(
     session: &Session,
     times: &[f64],
     settings: Settings,
-    limit: f64,
+    allowance: Allowance,
     say: &mut dyn FnMut(&str),
 ) -> Result<Option<PassiveStudy>, String> {
     let model = &session.model;
@@ -59,16 +66,24 @@ pub fn passive_study(
     if times.is_empty() || !is_passive {
         return Ok(None);
     }
+    let purse = Purse::open(allowance);
+    let (mut times, mut first) = (times, purse.first(FIRST));
     let mut tracks = Vec::new();
     for tolerance in TOLERANCES.into_iter().chain([REFERENCE]) {
         say(&format!("tolerance {tolerance:e}"));
-        // A run takes no less time than a coarser one.
-        let before = tracks.last().and_then(|(_, track): &(f64, Result<Track, String>)| track.as_ref().err());
-        let bending = BendSettings { tolerance, ..settings.bending };
-        let track = match before {
-            Some(why) => Err(why.clone()),
-            None => track(session, times, Settings { bending, ..settings }, limit),
+        let settings = Settings { bending: BendSettings { tolerance, ..settings.bending }, ..settings };
+        let track = match tracks.last() {
+            // A run takes no less time than a coarser one.
+            Some((_, Err(why))) => Err(String::clone(why)),
+            // With one run there is nothing to compare.
+            Some((_, Ok(Track { wall, .. }))) if tracks.len() > 1 => purse
+                .fits(MORE * wall, allowance.all)
+                .and_then(|()| track(session, times, settings, (allowance.run, None))),
+            _ => track(session, times, settings, (allowance.run, first.take())),
         };
+        if let Ok(track) = &track {
+            times = &times[..track.frames.len()];
+        }
         tracks.push((tolerance, track));
     }
     let finest = tracks.iter().rev().find_map(|(tolerance, track)| Some((*tolerance, track.as_ref().ok()?)));
@@ -83,6 +98,7 @@ pub fn passive_study(
             false => Err("what is drawn differs in number".to_owned()),
         }
     };
+    let last = times.last().copied().unwrap_or(0.0);
     let points = (tracks.iter())
         .filter(|(tolerance, _)| *tolerance != reference && *tolerance != REFERENCE)
         .map(|(tolerance, track)| {
@@ -90,17 +106,26 @@ pub fn passive_study(
             PassivePoint { tolerance: *tolerance, result }
         })
         .collect();
-    Ok(Some(PassiveStudy { points, reference, seconds: best.seconds, times: times.len() }))
+    Ok(Some(PassiveStudy { points, reference, seconds: best.seconds, times: times.len(), last }))
 }
 
 /// Some drawn points at each time, and the work.
 struct Track {
     frames: Vec<Vec<Point>>,
     seconds: f64,
+    /// With growth.
+    wall: f64,
 }
 
-/// A run. Motion and drawing are timed; growth on the way to the frames is not.
-fn track(session: &Session, times: &[f64], settings: Settings, limit: f64) -> Result<Track, String> {
+/// A run. Motion and drawing are timed; growth on the way to the frames is not. It takes at most `limit` seconds, and ends at an earlier time where it has
+/// taken `enough`.
+fn track(
+    session: &Session,
+    times: &[f64],
+    settings: Settings,
+    (limit, enough): (f64, Option<f64>),
+) -> Result<Track, String> {
+    let stopwatch = Stopwatch::start(enough);
     let settings = Settings { max_seconds: settings.max_seconds.min(limit), ..settings };
     let nursery = Nursery::new(&session.model, settings).without_gases().without_ground();
     let mut simulation = session.simulate(settings).map_err(|error| error.diagnostic().message)?;
@@ -116,8 +141,11 @@ fn track(session: &Session, times: &[f64], settings: Settings, limit: f64) -> Re
             return Err(format!("longer than {} s", brief(limit, 3)));
         }
         frames.push(points(&scene));
+        if stopwatch.is_enough(frames.len()) {
+            break;
+        }
     }
-    Ok(Track { frames, seconds })
+    Ok(Track { frames, seconds, wall: stopwatch.seconds() })
 }
 
 /// Points of a drawing: ends of stems, corners of polygons, and corners of surfaces, of large ones some.
@@ -135,7 +163,7 @@ fn points(scene: &Scene) -> Vec<Point> {
 
 /// The study as a table for a terminal.
 pub fn passive_table(study: &PassiveStudy) -> String {
-    let PassiveStudy { reference, seconds, times, points } = study;
+    let PassiveStudy { reference, seconds, times, points, .. } = study;
     let mut out = format!(
         "\nwhat falls and hangs, at {times} times, against {reference:e} ({} s)\n",
         brief(*seconds, 3)

@@ -120,9 +120,26 @@ pub struct Record {
     pub seconds: f64,
     /// Why the run ended before its last time; `None` if it did not.
     pub stop: Option<EarlyEnd>,
+    /// Counts of work at each observed time that was reached.
+    marks: Vec<Stats>,
 }
 
 impl Record {
+    /// Observed times that were reached.
+    pub fn reached(&self) -> usize {
+        self.states.len()
+    }
+
+    /// The run up to the first `count` times, of those that it has reached: as if it had observed no others. Its wall time stays that of the whole.
+    pub fn cut(&mut self, count: usize) {
+        let Some(stats) = count.checked_sub(1).and_then(|last| self.marks.get(last)) else { return };
+        (self.stats, self.stop) = (*stats, None);
+        self.states.truncate(count);
+        self.marks.truncate(count);
+        let end = self.states.last().map_or(0.0, |state| state.time);
+        self.events.truncate(self.events.partition_point(|event| event.time <= end));
+    }
+
     /// True if two runs agree in every number, because two names chose the same method.
     pub fn is_same_run(&self, other: &Record) -> bool {
         let same_state = |a: &ModuleString, b: &ModuleString| {
@@ -214,9 +231,13 @@ impl<'a> Task<'a> {
             stats: Stats::default(),
             seconds: 0.0,
             stop: None,
+            marks: Vec::with_capacity(self.times.len()),
         };
-        let states = &mut record.states;
-        let (seconds, simulation, stop) = self.run(setup, log, |string| states.push(string.clone()));
+        let (states, marks) = (&mut record.states, &mut record.marks);
+        let (seconds, simulation, stop) = self.run(setup, log, |string, stats| {
+            states.push(string.clone());
+            marks.push(stats);
+        });
         if let Some(mut simulation) = simulation {
             record.events = simulation.take_events();
             record.stats = simulation.stats();
@@ -227,14 +248,14 @@ impl<'a> Task<'a> {
 
     /// Wall time of a run in seconds; states are formed and dropped.
     pub fn time(&self, setup: Setup) -> f64 {
-        self.run(setup, false, |_| ()).0
+        self.run(setup, false, |_, _| ()).0
     }
 
     fn run(
         &self,
         setup: Setup,
         log: bool,
-        mut see: impl FnMut(&ModuleString),
+        mut see: impl FnMut(&ModuleString, Stats),
     ) -> (f64, Option<Simulation<'a>>, Option<EarlyEnd>) {
         let mut driver = Driver::new(self.limit, self.end());
         let settings = Settings { log, ..setup.settings(self.base) };
@@ -247,8 +268,29 @@ impl<'a> Task<'a> {
             if let Err(stop) = driver.go(&mut simulation, t, &mut string) {
                 return (driver.seconds(), Some(simulation), Some(stop));
             }
-            see(&string);
+            see(&string, simulation.stats());
         }
         (driver.seconds(), Some(simulation), None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_is_cut_is_that_of_fewer_times() {
+        let text = "initial string: A(0.1)\nA(x): if x < 1 solve dx/dt = x*(1 + 0.1*sin(t))\n if x = 1 produce A(0.5) [ A(0.3) ]";
+        let session = Session::from_text("fork.dls", text, &[]).expect("good");
+        let times: Vec<f64> = (1..=12).map(|i| 0.5 * f64::from(i)).collect();
+        let setup = Setup { method: Method::Dop853, accuracy: Accuracy::Tolerance(1e-6) };
+        let base = Settings { max_modules: 1000, ..Settings::default() };
+        let of = |times| Task { session: &session, times, limit: 10.0, base }.record(setup, true);
+        let (mut whole, part) = (of(&times), of(&times[..9]));
+        assert!(whole.events.len() > part.events.len() && !part.events.is_empty());
+        whole.cut(9);
+        assert!(whole.is_same_run(&part) && whole.reached() == 9 && whole.stop.is_none());
+        let events = |record: &Record| format!("{:?}", record.events);
+        assert_eq!(events(&whole), events(&part));
     }
 }

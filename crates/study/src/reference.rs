@@ -5,9 +5,10 @@
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
+use super::allowance::FEWEST;
 use super::compare::{Comparison, compare};
 use super::order::nominal_order;
-use super::record::{Accuracy, Record, Setup, Task, method_name};
+use super::record::{Accuracy, EarlyEnd, Record, Setup, Task, method_name};
 use dlsys_session::Session;
 use dlsys_sim::Method;
 
@@ -75,6 +76,30 @@ impl<'a> References<'a> {
     pub fn new(task: Task<'a>, step_size: f64) -> References<'a> {
         let task = Task { limit: PATIENCE * task.limit, ..task };
         References { task, step_size, exact: is_exact(task.session), runs: BTreeMap::new() }
+    }
+
+    /// How many of the times the two best tight runs reach in so many seconds each, at least two; further ones are observed no more. All, if they
+    /// fail for another reason.
+    pub fn shorten(&mut self, seconds: f64) -> usize {
+        let whole = self.task;
+        for method in candidates().into_iter().take(2) {
+            let setup = self.setup(method, false);
+            let task = Task { limit: seconds.min(whole.limit), ..self.task };
+            let mut record = task.record(setup, true);
+            if let Some(EarlyEnd::Overtime { .. }) = record.stop {
+                let count = record.reached();
+                if count < FEWEST {
+                    self.task = whole;
+                    self.runs.clear();
+                    return whole.times.len();
+                }
+                record.cut(count);
+                self.task.times = &whole.times[..count];
+                self.runs.values_mut().for_each(|run| Rc::make_mut(run).cut(count));
+            }
+            self.runs.insert((place(method), false), Rc::new(record));
+        }
+        self.task.times.len()
     }
 
     /// The reference of a method. If only the judged method itself reaches the last time, it is compared with itself, and
@@ -173,11 +198,17 @@ impl<'a> References<'a> {
     }
 
     fn run(&mut self, method: Method, relaxed: bool) -> Rc<Record> {
-        let place = Method::NAMED.iter().position(|(_, m)| *m == method).unwrap_or(Method::NAMED.len());
         let setup = self.setup(method, relaxed);
         let task = self.task;
-        Rc::clone(self.runs.entry((place, relaxed)).or_insert_with(|| Rc::new(task.record(setup, true))))
+        Rc::clone(
+            self.runs.entry((place(method), relaxed)).or_insert_with(|| Rc::new(task.record(setup, true))),
+        )
     }
+}
+
+/// The place of a method in `Method::NAMED`.
+fn place(method: Method) -> usize {
+    Method::NAMED.iter().position(|(_, m)| *m == method).unwrap_or(Method::NAMED.len())
 }
 
 /// Methods that can be a reference, the best first: with step control before those without, then

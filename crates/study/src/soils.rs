@@ -9,12 +9,15 @@ use dlsys_session::Session;
 use dlsys_sim::{Settings, brief};
 use dlsys_surround::{GROUND_TICKS, Motion, Passive, Place, Terrain, Weather};
 
+use super::allowance::{Allowance, Purse, Stopwatch};
 use super::table::Table;
 
 /// Widths of columns, in those of the scene, from the coarsest on; the last one is that of the reference.
 const CELLS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
-/// Ticks in a second, likewise.
-const TICKS: [f64; 4] = [GROUND_TICKS / 4.0, GROUND_TICKS / 2.0, GROUND_TICKS, 4.0 * GROUND_TICKS];
+/// Ticks in a second, in those of a scene, likewise.
+const TICKS: [f64; 4] = [0.25, 0.5, 1.0, 4.0];
+/// The part of the time for the study that its first run may take, where it may end at an earlier time.
+const FIRST: f64 = 0.06;
 /// Most places along an axis at which runs are compared.
 const PLACES: f64 = 200.0;
 /// The material has moved where the height has changed by more than this part of a column of the scene.
@@ -57,11 +60,14 @@ pub struct SoilStudy {
     pub by_tick: Vec<SoilPoint>,
     /// Number of times and of places at which heights are compared.
     pub times: usize,
+    /// The last of the times.
+    pub last: f64,
     /// See `times`.
     pub places: usize,
 }
 
 /// Heights at the places of a grid, at each time.
+#[derive(Clone)]
 struct Track {
     heights: Vec<Vec<f64>>,
     imbalance: i128,
@@ -87,7 +93,7 @@ impl Places {
 }
 
 /// Runs a scene with columns and ticks of several sizes. `None` if its ground is rigid, if it has none, or if rules read its heights or forces, so that growth would be another one.
-/// Runs that take longer than `limit` seconds are left out.
+/// Runs that would take longer than what is allowed are left out.
 ///
 /// # Errors
 /// The reason why the scene as it is does not come to the last time.
@@ -95,7 +101,7 @@ pub fn soil_study(
     session: &Session,
     times: &[f64],
     settings: Settings,
-    limit: f64,
+    allowance: Allowance,
     say: &mut dyn FnMut(&str),
 ) -> Result<Option<SoilStudy>, String> {
     let model = &session.model;
@@ -105,20 +111,42 @@ pub fn soil_study(
         return Ok(None);
     }
     let cell = bed.cell;
-    let settings = Settings { max_seconds: settings.max_seconds.min(limit), ..settings };
+    let purse = Purse::open(allowance);
+    let settings = Settings { max_seconds: settings.max_seconds.min(allowance.run), ..settings };
     // Where anything has moved by the last time.
     say(&format!("columns of {}", brief(cell, 3)));
-    let Some(places) = moved(model, times, settings)? else { return Ok(None) };
-    let mut run = |factor: f64, ticks: f64| {
-        say(&format!("columns of {}, {} ticks a second", brief(cell * factor, 3), brief(ticks, 4)));
+    let (count, places) = moved(model, times, settings, purse.first(FIRST))?;
+    let (Some(places), times) = (places, &times[..count]) else { return Ok(None) };
+    let mut known = Vec::new();
+    let mut run = |cells: f64, ticks: f64| -> Result<Track, String> {
+        let is_known = |(run, _): &&([f64; 2], Track)| *run == [cells, ticks];
+        if let Some((_, track)) = known.iter().find(is_known) {
+            return Ok(Track::clone(track));
+        }
+        // In proportion to the columns and to the ticks, from the run that is as it is declared, which is the first.
+        if let Some((_, Track { seconds, .. })) = known.first() {
+            purse.fits(seconds * ticks / (cells * cells), allowance.all)?;
+        }
+        let (wide, often) = (cell * cells, GROUND_TICKS * ticks);
+        say(&format!("columns of {}, {} ticks a second", brief(wide, 3), brief(often, 4)));
         let mut model = model.clone();
         if let Some(bed) = &mut model.scenery.bed {
-            bed.cell = cell * factor;
+            bed.cell = wide;
         }
-        track(&model, (times, places), (settings, ticks), limit)
+        let track = track(&model, (times, places), (settings, often), allowance.run)?;
+        known.push(([cells, ticks], track.clone()));
+        Ok(track)
     };
+    // The references last, which take longest.
+    let as_declared = run(1.0, 1.0);
+    let mut by_cell = CELLS.map(|cells| (cell * cells, GROUND_TICKS, Err(String::new())));
+    let mut by_tick = TICKS.map(|ticks| (cell, GROUND_TICKS * ticks, Err(String::new())));
+    for n in 0..CELLS.len() {
+        by_cell[n].2 = if CELLS[n] == 1.0 { as_declared.clone() } else { run(CELLS[n], 1.0) };
+        by_tick[n].2 = if TICKS[n] == 1.0 { as_declared.clone() } else { run(1.0, TICKS[n]) };
+    }
     let first: Vec<f64> = places.all().map(|[x, z]| bed.surface(x, z)).collect();
-    let compared = |tracks: Vec<(f64, f64, Result<Track, String>)>| -> Vec<SoilPoint> {
+    let compared = |tracks: [(f64, f64, Result<Track, String>); 4]| -> Vec<SoilPoint> {
         // The finest that came to the end.
         let finest = tracks.iter().rposition(|(.., track)| track.is_ok());
         let points = tracks.iter().map(|(cell, ticks, track)| {
@@ -132,14 +160,12 @@ pub fn soil_study(
         });
         points.collect()
     };
-    let by_cell =
-        CELLS.map(|factor| (cell * factor, GROUND_TICKS, run(factor, GROUND_TICKS))).into_iter().collect();
-    let by_tick = TICKS.map(|ticks| (cell, ticks, run(1.0, ticks))).into_iter().collect();
     let count = places.counts[0] * places.counts[1];
     Ok(Some(SoilStudy {
         by_cell: compared(by_cell),
         by_tick: compared(by_tick),
         times: times.len(),
+        last: times.last().copied().unwrap_or(0.0),
         places: count,
     }))
 }
@@ -159,17 +185,32 @@ fn passive(
     Ok((terrain.ok_or("the ground is rigid")?, motion))
 }
 
-/// The places around all that differs from the surface at the beginning at the last time; none if nothing does.
-fn moved(model: &Model, times: &[f64], settings: Settings) -> Result<Option<Places>, String> {
-    let Some(bed) = &model.scenery.bed else { return Ok(None) };
+/// The places around all that differs from the surface at the beginning at the last time; none if nothing does. Where it takes longer than `enough`
+/// seconds to come there, that is an earlier one: returns also the number of times up to it.
+fn moved(
+    model: &Model,
+    times: &[f64],
+    settings: Settings,
+    enough: Option<f64>,
+) -> Result<(usize, Option<Places>), String> {
+    let Some(bed) = &model.scenery.bed else { return Ok((0, None)) };
+    let stopwatch = Stopwatch::start(enough);
     let (terrain, motion) = passive(model, settings, GROUND_TICKS)?;
-    let last = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let fault = |error: dlsys_surround::Error| error.diagnostic().message;
-    let Some([low, high]) = terrain.moved(last, motion.as_ref()).map_err(fault)? else { return Ok(None) };
+    let (mut count, mut extent) = (0, None);
+    for &time in times {
+        extent = terrain.moved(time, motion.as_ref()).map_err(fault)?;
+        count += 1;
+        // What has not moved yet is no study.
+        if extent.is_some() && stopwatch.is_enough(count) {
+            break;
+        }
+    }
+    let Some([low, high]) = extent else { return Ok((count, None)) };
     let long = (high[0] - low[0]).max(high[1] - low[1]);
     let step = bed.cell.max(long / (PLACES - 1.0));
     let counts = [0, 1].map(|axis| ((high[axis] - low[axis]) / step).floor() as usize + 1);
-    Ok(Some(Places { low, step, counts }))
+    Ok((count, Some(Places { low, step, counts })))
 }
 
 /// A run. What it takes is timed; growth is a part of that.

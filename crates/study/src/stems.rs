@@ -11,12 +11,16 @@ use dlsys_sim::{BendMethod, BendSettings, Settings, Simulation, brief};
 use dlsys_surround::{Effort, Motion, Passive, Place, Weather};
 use dlsys_tree::ModuleString;
 
+use super::allowance::{Allowance, Purse, Stopwatch};
+use super::points::Share;
 use super::table::Table;
 
 /// Tolerances of a study.
 const TOLERANCES: [f64; 5] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 /// The reference.
 const REFERENCE: BendSettings = BendSettings { method: BendMethod::Ros34Pw2, tolerance: 1e-8 };
+/// The part of the time for the study that its first run may take, where it may end at an earlier time.
+const FIRST: f64 = 0.08;
 /// Most points of a frame that are compared.
 const MOST_POINTS: usize = 2000;
 
@@ -51,17 +55,21 @@ pub struct StemStudy {
     pub effort: Effort,
     /// Number of times at which points are compared.
     pub times: usize,
+    /// The last of them.
+    pub last: f64,
 }
 
 /// Some drawn points at each time, and the work.
 struct Track {
     frames: Vec<Vec<Point>>,
     seconds: f64,
+    /// With growth and drawing.
+    wall: f64,
     effort: Effort,
 }
 
-/// Runs a model with each method at each tolerance. `None` if no stems of the model bend. Runs that take longer than `limit` seconds are
-/// left out.
+/// Runs a model with each method at each tolerance. `None` if no stems of the model bend. Each method has an equal part of the time that is allowed; runs
+/// that would take longer are left out.
 ///
 /// # Errors
 /// The reason why no run comes to the last time.
@@ -69,37 +77,37 @@ pub fn stem_study(
     session: &Session,
     times: &[f64],
     settings: Settings,
-    limit: f64,
+    allowance: Allowance,
     say: &mut dyn FnMut(&str),
 ) -> Result<Option<StemStudy>, String> {
     if !turtle::bends(&session.model) || times.is_empty() {
         return Ok(None);
     }
-    // The run before took so long.
-    let mut run = |bending: BendSettings, before: Option<(f64, f64)>| {
-        say(&format!("{} at {:e}", bending.method.name(), bending.tolerance));
-        // With order 2, and the better orders are for small tolerances.
-        let more = |(tolerance, seconds): (f64, f64)| seconds * (tolerance / bending.tolerance).sqrt();
-        match before.map(more).filter(|seconds| *seconds > limit) {
-            Some(seconds) => Err(format!("left out, would take about {} s", brief(seconds, 2))),
-            None => track(session, times, Settings { bending, ..settings }, limit),
-        }
-    };
-    let (mut tracks, mut finest) = (Vec::new(), None);
+    let purse = Purse::open(allowance);
+    let mut share = Share::new(allowance.all, BendMethod::NAMED.len());
+    let (mut times, mut first, mut tracks) = (times, purse.first(FIRST), Vec::new());
     for (_, method) in BendMethod::NAMED {
-        let mut before = None;
-        for tolerance in TOLERANCES {
+        let (begun, finest) = (purse.spent(), (REFERENCE.method == method).then_some(REFERENCE.tolerance));
+        let within = begun + share.next();
+        // The run before took so long.
+        let mut before: Option<(f64, f64)> = None;
+        for tolerance in TOLERANCES.into_iter().chain(finest) {
             let bending = BendSettings { method, tolerance };
-            let track = run(bending, before);
-            // What was left out is judged from the last that was not.
-            before = track.as_ref().map_or(before, |track| Some((tolerance, track.seconds)));
+            say(&format!("{} at {tolerance:e}", method.name()));
+            // With order 2, and the better orders are for small tolerances.
+            let more = |(known, seconds): (f64, f64)| seconds * (known / tolerance).sqrt();
+            let fits = before.map_or(Ok(()), |before| purse.fits(more(before), within));
+            let settings = Settings { bending, ..settings };
+            let track = fits.and_then(|()| track(session, times, settings, (allowance.run, first.take())));
+            if let Ok(track) = &track {
+                times = &times[..track.frames.len()];
+                // What is left out is judged from the last that was not.
+                before = Some((tolerance, track.wall));
+            }
             tracks.push((bending, track));
         }
-        if method == REFERENCE.method {
-            finest = before;
-        }
+        share.spend(purse.spent() - begun);
     }
-    tracks.push((REFERENCE, run(REFERENCE, finest)));
     // The finest of the run of the highest order that came to its end.
     let rank = |bending: &BendSettings| (-bending.tolerance, bending.method == REFERENCE.method);
     let good = tracks.iter().filter_map(|(bending, track)| Some((bending, track.as_ref().ok()?)));
@@ -123,11 +131,19 @@ pub fn stem_study(
             StemPoint { bending: *bending, result: result.map(outcome) }
         })
         .collect();
-    Ok(Some(StemStudy { points, reference, effort: best.effort, times: times.len() }))
+    let last = times.last().copied().unwrap_or(0.0);
+    Ok(Some(StemStudy { points, reference, effort: best.effort, times: times.len(), last }))
 }
 
-/// A run. Its motion is timed; growth on the way to the frames and drawing are not.
-fn track(session: &Session, times: &[f64], settings: Settings, limit: f64) -> Result<Track, String> {
+/// A run. Its motion is timed; growth on the way to the frames and drawing are not. It takes at most `limit` seconds, and ends at an earlier time where it has
+/// taken `enough`.
+fn track(
+    session: &Session,
+    times: &[f64],
+    settings: Settings,
+    (limit, enough): (f64, Option<f64>),
+) -> Result<Track, String> {
+    let stopwatch = Stopwatch::start(enough);
     let model = &session.model;
     let fault = |error: dlsys_surround::Error| error.diagnostic().message;
     let weather = Weather::of(model, settings).map_err(fault)?;
@@ -152,8 +168,11 @@ fn track(session: &Session, times: &[f64], settings: Settings, limit: f64) -> Re
         scene.clear();
         turtle::draw_bent(model, &string, &bent, &mut scene).map_err(|error| error.to_string())?;
         frames.push(points(&scene));
+        if stopwatch.is_enough(frames.len()) {
+            break;
+        }
     }
-    Ok(Track { frames, seconds, effort: motion.effort() })
+    Ok(Track { frames, seconds, wall: stopwatch.seconds(), effort: motion.effort() })
 }
 
 /// Points of a drawing: ends of stems, corners of polygons, places of surfaces and patches.
@@ -175,7 +194,11 @@ pub(crate) fn relative_distance(frames: &[Vec<Point>], reference: &[Vec<Point>])
             (low[axis], high[axis]) = (low[axis].min(point[axis]), high[axis].max(point[axis]));
         }
     }
-    let extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+    let mut extent = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
+    if extent == 0.0 {
+        // A single point: relative to its way from the origin.
+        extent = low.iter().map(|x| x.abs()).fold(0.0, f64::max);
+    }
     let pairs = frames.iter().zip(reference).flat_map(|(a, b)| a.iter().zip(b));
     let most = pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     if most == 0.0 { 0.0 } else { most / extent }

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use super::allowance::Allowance;
 use super::compare::Agreement;
 use super::error::Error;
 use super::order::{nominal_order, observed_order};
@@ -26,11 +27,9 @@ pub struct Plan {
     pub times: Vec<f64>,
     /// Timed runs of a point, at least 1; fewer if together they take more than 0.2 seconds.
     pub runs: usize,
-    /// Allowed wall time of a single run in seconds.
-    pub time_limit: f64,
-    /// Seconds for the points of all methods whose accuracies are not listed, an equal part for each. Points that do not fit are left
-    /// out. The runs that all are compared with come on top.
-    pub budget: f64,
+    /// Seconds for the points of all methods whose accuracies are not listed, an equal part for each; points that do not fit are left out. The runs
+    /// that all are compared with come on top. Where one of these would take longer than a third of that, the study ends at an earlier time, if it may.
+    pub allowance: Allowance,
     /// Settings of all runs but for method and accuracy, such as limits.
     pub base: dlsys_sim::Settings,
 }
@@ -149,6 +148,9 @@ pub struct Point {
     pub result: Result<Outcome, f64>,
 }
 
+/// The part of the time for all points that a tight run may take, where the study may end at an earlier time.
+const FOR_A_REFERENCE: f64 = 0.35;
+
 /// The name that the scheduler `local` has among methods.
 const LOCAL: &str = "local";
 
@@ -191,7 +193,7 @@ pub struct Study {
 
 impl Study {
     /// How many points were left out though a run of each would have taken less than `limit` seconds, and about which
-    /// [`budget`](Plan::budget) has time for all; `None` if there are none.
+    /// [`allowance`](Plan::allowance) has time for all; `None` if there are none.
     pub fn left_out(&self, limit: f64) -> Option<(usize, f64)> {
         let expected = |point: &Point| point.result.as_ref().err().copied();
         let all = self.series.iter().flat_map(|series| &series.points);
@@ -220,13 +222,17 @@ pub fn study(
     watch: &mut dyn FnMut(&str),
     done: &mut dyn FnMut(&Study),
 ) -> Result<Study, Error> {
-    let task = Task { session, times: &plan.times, limit: plan.time_limit, base: plan.base };
+    let mut task = Task { session, times: &plan.times, limit: plan.allowance.run, base: plan.base };
     let steps = Plan::default_step_sizes(task.end(), None);
     let mut references = References::new(task, steps.last().copied().unwrap_or(1.0) / 2.0);
+    if plan.allowance.may_shorten {
+        watch("how far it goes");
+        task.times = &plan.times[..references.shorten(FOR_A_REFERENCE * plan.allowance.all)];
+    }
     let mut study = Study {
         name: name.to_owned(),
         title: session.model.title.clone().unwrap_or_else(|| session.source.name.clone()),
-        times: plan.times.clone(),
+        times: task.times.to_vec(),
         events: 0,
         modules: 0,
         runs: plan.runs,
@@ -234,7 +240,7 @@ pub fn study(
     };
     let all = plan.named(session);
     let are_listed = |(method, name): &(Method, &str)| plan.accuracies(*method, name, task.end()).1;
-    let mut share = Share::new(plan.budget, all.iter().filter(|series| !are_listed(series)).count());
+    let mut share = Share::new(plan.allowance.all, all.iter().filter(|series| !are_listed(series)).count());
     for (method, name) in all {
         watch(&format!("{name}: reference"));
         let reference = references.of(method).map_err(Error::NoReference)?;
@@ -244,7 +250,7 @@ pub fn study(
         let order = nominal_order(name);
         let (accuracies, listed) = plan.accuracies(method, name, task.end());
         let series = if listed { f64::INFINITY } else { share.next() };
-        let limits = Limits { run: plan.time_limit, series };
+        let limits = Limits { run: plan.allowance.run, series };
         let begun = Instant::now();
         let common = points::Series { task, method, order, reference: &reference, runs: plan.runs };
         let points = common.points(accuracies, limits, watch);
@@ -310,8 +316,7 @@ mod tests {
             slices: None,
             times: (1..=60).map(f64::from).collect(),
             runs: 1,
-            time_limit: 10.0,
-            budget: f64::INFINITY,
+            allowance: Allowance { run: 10.0, all: f64::INFINITY, may_shorten: false },
             base: dlsys_sim::Settings { max_modules: 100, ..Default::default() },
         };
         let study = study(&session, "order", &plan, &mut |_| (), &mut |_| ()).expect("a study");

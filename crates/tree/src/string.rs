@@ -156,6 +156,14 @@ impl ModuleString {
         &mut self.parameters
     }
 
+    /// Bytes of memory, about.
+    pub fn footprint(&self) -> usize {
+        size_of_val(&*self.entries)
+            + size_of_val(&*self.parameters)
+            + size_of_val(&*self.ungrouped)
+            + self.groups.size()
+    }
+
     /// Number of modules, brackets included.
     pub fn len(&self) -> usize {
         self.entries.len()

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use super::args::ReportArgs;
 use super::common::{Failure, count_of, open, out_error};
@@ -14,8 +15,9 @@ use super::progress::Progress;
 use crate::model::Frames;
 use crate::render;
 use crate::session::Session;
-use crate::sim::Method;
-use crate::study::{self, CASES, Case, CaseResult, HardPlan, Plan};
+use crate::sim::{Method, brief};
+use crate::study::{self, Allowance, CASES, Case, CaseResult, HardPlan, Plan};
+use crate::turtle;
 
 /// Studies models, or runs the hard cases.
 pub fn report(args: &ReportArgs) -> Result<(), Failure> {
@@ -69,6 +71,9 @@ fn verify(args: &ReportArgs, session: &Session) -> Result<bool, Failure> {
     crate::cli::verify::verify_all(args, session, &tolerances, &times(args, session)?, &print)
 }
 
+/// A study of a passive part of a scene.
+type Part = fn(&ReportArgs, &Session, &str, &Plan) -> Result<(), Failure>;
+
 /// Studies a model that has been read; `name` is the stem of the files.
 fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure> {
     let plan = Plan {
@@ -78,8 +83,7 @@ fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure
         slices: args.slices.clone(),
         times: times(args, session)?,
         runs: args.runs,
-        time_limit: args.time_limit,
-        budget: args.study_budget,
+        allowance: allowance(args, session),
         base: args.budget.settings(),
     };
     let progress = RefCell::new(Progress::of_printed(name, plan.points(session)));
@@ -110,10 +114,21 @@ fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure
             session.source.name
         ))
     })?;
-    print(&left_out(&study, args))?;
-    stems(args, session, name, &plan)?;
-    passive(args, session, name, &plan)?;
-    soils(args, session, name, &plan)?;
+    print(&left_out(&study, args, &plan))?;
+    // Together they have as much time as growth.
+    let (model, scenery) = (&session.model, &session.model.scenery);
+    let has_passive = turtle::lets_go(model) || !scenery.sheets.is_empty();
+    let parts: [(bool, Part); 3] =
+        [(turtle::bends(model), stems), (has_passive, passive), (scenery.bed.is_some(), soils)];
+    let parts: Vec<Part> =
+        parts.into_iter().filter(|(is_there, _)| *is_there).map(|(_, part)| part).collect();
+    let mut rest = plan.allowance.all;
+    for (number, part) in parts.iter().enumerate() {
+        let begun = Instant::now();
+        let all = rest / (parts.len() - number) as f64;
+        part(args, session, name, &Plan { allowance: Allowance { all, ..plan.allowance }, ..plan.clone() })?;
+        rest = (rest - begun.elapsed().as_secs_f64()).max(0.0);
+    }
     print("\n")?;
     let Some(out) = &args.out else { return Ok(()) };
     write(out, &format!("{name}.csv"), &study::csv(&study))?;
@@ -121,8 +136,34 @@ fn study(args: &ReportArgs, session: &Session, name: &str) -> Result<(), Failure
     write(out, &format!("{name}.svg"), &study::svg(&study))
 }
 
-/// How many points did not fit into the time, and which time has room for them.
-fn left_out(study: &study::Study, args: &ReportArgs) -> String {
+/// The time of a study. It may end earlier where neither its times nor its points were asked for.
+fn allowance(args: &ReportArgs, session: &Session) -> Allowance {
+    let (times, points) = (&args.at, [&args.tolerances, &args.step_sizes, &args.slices]);
+    let is_asked_for = times.is_some() || args.from.is_some() || points.into_iter().any(Option::is_some);
+    let may_shorten = session.model.frames.is_some() && !is_asked_for;
+    Allowance { run: args.time_limit, all: args.study_budget, may_shorten }
+}
+
+/// What a part of the report did not reach, if it ended before the last of the times.
+fn shortened(args: &ReportArgs, what: &str, last: f64, plan: &Plan) -> String {
+    match plan.times.last() {
+        Some(end) if last < *end => format!(
+            "\n{what} from t = {} to {} left out, as it takes longer than `--budget {}`: a larger one goes further, `--at {}` to the end in any case\n",
+            brief(last, 6),
+            brief(*end, 6),
+            args.study_budget,
+            brief(*end, 6)
+        ),
+        _ => String::new(),
+    }
+}
+
+/// How much did not fit into the time, and which time has room for it.
+fn left_out(study: &study::Study, args: &ReportArgs, plan: &Plan) -> String {
+    let shortened = shortened(args, "growth", study.times.last().copied().unwrap_or(0.0), plan);
+    if !shortened.is_empty() {
+        return shortened;
+    }
     let Some((count, enough)) = study.left_out(args.time_limit) else { return String::new() };
     // Rounded up to a digit.
     let unit = 10f64.powf(enough.max(1.0).log10().floor());
@@ -134,7 +175,7 @@ fn left_out(study: &study::Study, args: &ReportArgs) -> String {
 /// Studies the methods of bending on a model with tissues.
 fn stems(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Result<(), Failure> {
     let mut progress = Progress::new("stems", 16);
-    let study = study::stem_study(session, &plan.times, plan.base, plan.time_limit, &mut |what| {
+    let study = study::stem_study(session, &plan.times, plan.base, plan.allowance, &mut |what| {
         progress.say(format!("{name}: stems by {what}"));
         progress.inc();
     });
@@ -143,7 +184,7 @@ fn stems(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Resul
         Failure::Model(format!("error: {}: its stems cannot be followed\n  {why}\n", session.source.name))
     })?;
     let Some(study) = study else { return Ok(()) };
-    print(&study::stem_table(&study))?;
+    print(&(study::stem_table(&study) + &shortened(args, "stems", study.last, plan)))?;
     match &args.out {
         Some(out) => write(out, &format!("{name}-stems.csv"), &study::stem_csv(&study)),
         None => Ok(()),
@@ -153,14 +194,18 @@ fn stems(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Resul
 /// Studies the tolerance on a scene in which something falls or hangs.
 fn passive(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Result<(), Failure> {
     let mut progress = Progress::new("scene", 5);
-    let study = study::passive_study(session, &plan.times, plan.base, plan.time_limit, &mut |what| {
+    let study = study::passive_study(session, &plan.times, plan.base, plan.allowance, &mut |what| {
         progress.say(format!("{name}: what falls and hangs by {what}"));
         progress.inc();
     });
     drop(progress);
     let file = format!("{name}-scene.csv");
-    let texts =
-        study.map(|study| study.map(|study| [study::passive_table(&study), study::passive_csv(&study)]));
+    let texts = study.map(|study| {
+        study.map(|study| {
+            let note = shortened(args, "what falls and hangs", study.last, plan);
+            [study::passive_table(&study) + &note, study::passive_csv(&study)]
+        })
+    });
     passive_result(args, "what falls and hangs: no run came to the last time", &file, texts)
 }
 
@@ -187,13 +232,18 @@ fn passive_result(
 /// Studies the sizes of columns and of ticks on a scene with ground that gives way.
 fn soils(args: &ReportArgs, session: &Session, name: &str, plan: &Plan) -> Result<(), Failure> {
     let mut progress = Progress::new("ground", 9);
-    let study = study::soil_study(session, &plan.times, plan.base, plan.time_limit, &mut |what| {
+    let study = study::soil_study(session, &plan.times, plan.base, plan.allowance, &mut |what| {
         progress.say(format!("{name}: ground with {what}"));
         progress.inc();
     });
     drop(progress);
     let file = format!("{name}-ground.csv");
-    let texts = study.map(|study| study.map(|study| [study::soil_table(&study), study::soil_csv(&study)]));
+    let texts = study.map(|study| {
+        study.map(|study| {
+            let note = shortened(args, "ground", study.last, plan);
+            [study::soil_table(&study) + &note, study::soil_csv(&study)]
+        })
+    });
     passive_result(args, "ground: it does not come to the last time", &file, texts)
 }
 
