@@ -254,6 +254,47 @@ fn equations_that_are_singular_with_one_solution_go_on() {
 }
 
 #[test]
+fn solutions_on_the_other_side_of_a_condition_are_found() {
+    let root = |x: f64, a: f64| x.signum() * ((a * a + 4.0 * x.abs()).sqrt() - a) / 2.0;
+    for (equation, truth) in [
+        ("u*abs(u) + 0.427*u - x", root(-1.0, 0.427)),
+        ("u + max(u, 0)^2 - x", -1.0),
+        ("(if u > 0 then u^2 + u else u) - x", -1.0),
+        ("sign(u)*u^2 + u - x", root(-1.0, 1.0)),
+        ("max(u, -0.5)^3 + u - x", -0.875),
+    ] {
+        for start in [0.0, 0.1, 1.0, -0.1, 30.0] {
+            let text = format!("initial string: A(-1, {start})\nA(x, u): solve dx/dt = 1, 0 = {equation}");
+            let states =
+                run(&text, Settings::default(), &[0.0]).unwrap_or_else(|error| panic!("{text}: {error}"));
+            let values = &states[0][0].1;
+            assert!((values[1] - truth).abs() < 1e-9, "{text}: {states:?}, not {truth}");
+        }
+    }
+    // Two unknowns; and in a run, where what is read changes its sign at an event.
+    let two = "initial string: A(-1, 0.5, 0.5)\nA(x, u, v): solve dx/dt = 1, 0 = u*abs(u) + u + 0.1*v - x, 0 = v*abs(v) + 0.3*v - u";
+    let states = run(two, Settings::default(), &[0.0]).expect("it has a solution");
+    let values = &states[0][0].1;
+    let (u, v) = (values[1], values[2]);
+    assert!(u < 0.0 && (u * u.abs() + u + 0.1 * v + 1.0).abs() < 1e-9, "{states:?}");
+    assert!(v < 0.0 && (v * v.abs() + 0.3 * v - u).abs() < 1e-9, "{states:?}");
+    let turns = "initial string: P(1) A(0, 0.5)\nP(p): if age = 1 produce P(-p)\nP(p) < A(x, u): solve dx/dt = u, 0 = u*abs(u) + u - p";
+    follows(turns, &[0.5, 1.5], |t| {
+        let u = root(1.0, 1.0);
+        match t < 1.0 {
+            true => vec![vec![1.0], vec![u * t, u]],
+            false => vec![vec![-1.0], vec![u * (2.0 - t), -u]],
+        }
+    });
+    // Where the sign changes at a jump or a pole, there is no solution.
+    for equation in ["(if u > 0 then u + 1 else u - 1)", "1/u + 0*x", "exp(u) - x", "u^2 - x"] {
+        let text = format!("initial string: A(-1, 0.5)\nA(x, u): solve dx/dt = 1, 0 = {equation}");
+        let error = run(&text, Settings::default(), &[0.0]).expect_err(&text).to_string();
+        assert!(error.contains("no value") || error.contains("singular"), "{text}: {error}");
+    }
+}
+
+#[test]
 fn steps_of_a_fixed_length_know_values_too() {
     let text = "initial string: A(1, 1)\nA(x, y): solve dx/dt = y, 0 = y^2 - x";
     let settings = Settings { method: Method::Rk4, step_size: 0.01, ..Settings::default() };

@@ -29,6 +29,7 @@ pub mod reintegration;
 mod repair;
 mod restart;
 pub mod rows;
+mod search;
 mod sections;
 mod sift;
 mod step;
