@@ -192,6 +192,108 @@ fn singular_equations_say_so() {
     assert_eq!(nothing.site().time, 0.0);
 }
 
+/// The equations of `u` in `A(x, u)`, with the start of x, its rate, the start of u, and the time at which two solutions meet.
+const MEETINGS: [(&str, f64, &str, f64, f64); 9] = [
+    ("(u + x)*(u - 2*x)", -1.0, "1", 1.0, 1.0),
+    ("(u + x)*(u - 2*x)", -1.0, "1 + 0.001*sin(x)^2", 1.0, 0.999_727),
+    ("u^2 - x^2", -1.0, "1", 1.0, 1.0),
+    ("u^3 - x*u", -1.0, "1", 0.0, 1.0),
+    ("u^2 + x - 1", 0.0, "2 - 2*t", 1.0, 1.0),
+    // Written out, solutions have half the digits where they meet.
+    ("u^2 - (0.3 + 0.5*t + 1 + 0.37*t)*u + (0.3 + 0.5*t)*(1 + 0.37*t)", 0.0, "1", 0.3, 0.7 / 0.13),
+    // They meet twice, within a thousandth and a millionth of a step.
+    ("u*(u - (t - 1)*(t - 1.001))", 0.0, "1", 0.0, 1.0),
+    ("u*(u - (t - 1)*(t - 1.000001))", 0.0, "1", 0.0, 1.0),
+    // At the instant of a kink.
+    ("(u + x)*(u - 2*x)", -1.0, "1 + abs(x)", 1.0, std::f64::consts::LN_2),
+];
+
+#[test]
+fn where_two_solutions_meet_the_run_ends() {
+    for (equation, x, rate, u, time) in MEETINGS {
+        for method in [Method::Auto, Method::Dopri5, Method::Radau] {
+            let text = format!("initial string: A({x}, {u})\nA(x, u): solve dx/dt = {rate}, 0 = {equation}");
+            let settings = Settings { method, ..Settings::default() };
+            let error = run(&text, settings, &[8.0]).expect_err(&format!("two solutions meet: {text}"));
+            let said = error.to_string();
+            assert!(said.contains("meet") || said.contains("singular"), "{text}, {method:?}: {said}");
+            assert!((error.site().time - time).abs() < 1e-5, "{text}, {method:?}: {said}, not at {time}");
+        }
+    }
+    // Two unknowns, of two modules.
+    let text = "initial string: P(0) A(0, 0) B(0)\nP(x): solve dx/dt = 1\n\
+        P(x) < A(u, s) > B(v): solve 0 = (u + v + x - 1)*(u + v - 2*x + 2)\nA(u, s) < B(v): solve 0 = v - u/2";
+    let error = fails(text);
+    assert!(error.to_string().contains("meet") && (error.site().time - 1.0).abs() < 1e-6, "{error}");
+}
+
+#[test]
+fn an_event_before_two_solutions_meet_comes_first() {
+    let text = "initial string: A(-1, 1)\nA(x, u):\n  solve dx/dt = 1, 0 = (u + x)*(u - 2*x)\n  if x = -1e-6 produce B(u)";
+    let states = run(text, Settings::default(), &[2.0]).expect("it is replaced before");
+    assert!(states[0][0].0 == "B" && (states[0][0].1[0] - 1e-6).abs() < 1e-9, "{states:?}");
+}
+
+#[test]
+fn equations_that_are_singular_with_one_solution_go_on() {
+    for (equation, u, truth) in [
+        // A root of odd order, a factor that does not matter, three solutions that become one, two that keep apart.
+        ("u^3 - x", -1.0, 1.0),
+        ("x*(u - sin(x))", -0.8, 1.0_f64.sin()),
+        ("x^2*(u - sin(x))", -0.8, 1.0_f64.sin()),
+        ("u^3 + x*u", 1.0, 0.0),
+        ("u^2 - x^2 - 1e-6", 1.0, 1.000_000_5),
+        ("u*abs(u) + 0.1*u - x", -0.9, 0.951_249_2),
+    ] {
+        let text = format!("initial string: A(-1, {u})\nA(x, u): solve dx/dt = 1, 0 = {equation}");
+        let states =
+            run(&text, Settings::default(), &[2.0]).unwrap_or_else(|error| panic!("{text}: {error}"));
+        let values = &states[0][0].1;
+        assert!((values[1] - truth).abs() < 1e-5, "{text}: {states:?}");
+    }
+}
+
+#[test]
+fn solutions_on_the_other_side_of_a_condition_are_found() {
+    let root = |x: f64, a: f64| x.signum() * ((a * a + 4.0 * x.abs()).sqrt() - a) / 2.0;
+    for (equation, truth) in [
+        ("u*abs(u) + 0.427*u - x", root(-1.0, 0.427)),
+        ("u + max(u, 0)^2 - x", -1.0),
+        ("(if u > 0 then u^2 + u else u) - x", -1.0),
+        ("sign(u)*u^2 + u - x", root(-1.0, 1.0)),
+        ("max(u, -0.5)^3 + u - x", -0.875),
+    ] {
+        for start in [0.0, 0.1, 1.0, -0.1, 30.0] {
+            let text = format!("initial string: A(-1, {start})\nA(x, u): solve dx/dt = 1, 0 = {equation}");
+            let states =
+                run(&text, Settings::default(), &[0.0]).unwrap_or_else(|error| panic!("{text}: {error}"));
+            let values = &states[0][0].1;
+            assert!((values[1] - truth).abs() < 1e-9, "{text}: {states:?}, not {truth}");
+        }
+    }
+    // Two unknowns; and in a run, where what is read changes its sign at an event.
+    let two = "initial string: A(-1, 0.5, 0.5)\nA(x, u, v): solve dx/dt = 1, 0 = u*abs(u) + u + 0.1*v - x, 0 = v*abs(v) + 0.3*v - u";
+    let states = run(two, Settings::default(), &[0.0]).expect("it has a solution");
+    let values = &states[0][0].1;
+    let (u, v) = (values[1], values[2]);
+    assert!(u < 0.0 && (u * u.abs() + u + 0.1 * v + 1.0).abs() < 1e-9, "{states:?}");
+    assert!(v < 0.0 && (v * v.abs() + 0.3 * v - u).abs() < 1e-9, "{states:?}");
+    let turns = "initial string: P(1) A(0, 0.5)\nP(p): if age = 1 produce P(-p)\nP(p) < A(x, u): solve dx/dt = u, 0 = u*abs(u) + u - p";
+    follows(turns, &[0.5, 1.5], |t| {
+        let u = root(1.0, 1.0);
+        match t < 1.0 {
+            true => vec![vec![1.0], vec![u * t, u]],
+            false => vec![vec![-1.0], vec![u * (2.0 - t), -u]],
+        }
+    });
+    // Where the sign changes at a jump or a pole, there is no solution.
+    for equation in ["(if u > 0 then u + 1 else u - 1)", "1/u + 0*x", "exp(u) - x", "u^2 - x"] {
+        let text = format!("initial string: A(-1, 0.5)\nA(x, u): solve dx/dt = 1, 0 = {equation}");
+        let error = run(&text, Settings::default(), &[0.0]).expect_err(&text).to_string();
+        assert!(error.contains("no value") || error.contains("singular"), "{text}: {error}");
+    }
+}
+
 #[test]
 fn steps_of_a_fixed_length_know_values_too() {
     let text = "initial string: A(1, 1)\nA(x, y): solve dx/dt = y, 0 = y^2 - x";

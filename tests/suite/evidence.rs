@@ -496,3 +496,36 @@ fn conditions_that_come_back_after_a_pole_are_seen() {
     let exact = 3.0 - (std::f64::consts::FRAC_PI_2 - 2f64.atan());
     assert!((after("tan(t) > -2", 3.0) - exact).abs() < 1e-5, "{}", after("tan(t) > -2", 3.0));
 }
+
+/// A module that is born on the edge of a condition, and does not move at once, leaves it once: however long the difference is rounding.
+#[test]
+fn a_module_born_on_an_edge_leaves_it_once_though_it_does_not_move_at_once() {
+    for (rate, at) in [
+        ("5*age", 15.0),
+        ("5*age^2", 15.0),
+        ("3*sin(age)", 3.0),
+        ("5*t", 15.0),
+        ("t^3", 15.0),
+        ("1 - cos(2*age)", 15.0),
+        ("exp(age) - 1", 3.0),
+        ("1e-3*age", 30.0),
+    ] {
+        for (low, high, window) in [
+            (2.5, 2.6, "x^2 - 5.1*x + 6.5"),
+            (0.7, 0.9, "x^2 - 1.6*x + 0.63"),
+            (0.7, 0.9, "abs(x - 0.8) - 0.1"),
+            (-0.3, 0.1, "x^2 + 0.2*x - 0.03"),
+        ] {
+            for born in [low, high] {
+                let text = format!(
+                    "initial string: A({born}, 0, {side})\nA(x, n, s):\n  solve dx/dt = {rate}\n  \
+                     if {window} < 0 & s = 0 produce A(x, n + 1, 1)\n  if {window} > 0 & s = 1 produce A(x, n + 1, 0)\n",
+                    side = u8::from(born == high),
+                );
+                let states = run(&text, Settings::default(), &[at]).unwrap_or_else(|e| panic!("{text}{e}"));
+                let wanted = if born == high { 1.0 } else { 2.0 };
+                assert_eq!(states[0][0].1[1], wanted, "{states:?} of\n{text}");
+            }
+        }
+    }
+}

@@ -17,7 +17,8 @@ use crate::scene_checks::MaterialNumber;
 use crate::scenery::Nesting;
 use crate::scope::{Scope, Variables};
 use crate::{
-    Setting, appearance, check, contexts, dead_rules, globals, porting, scene_checks, scenery, sheets,
+    Setting, appearance, check, contexts, coverage, dead_rules, globals, porting, scene_checks, scenery,
+    sheets,
 };
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
@@ -251,7 +252,7 @@ impl<'d> Parts<'d> {
         }
         check::period(self.period, &model, diagnostics);
         inputs::check(&model, inputs, diagnostics);
-        check::coverage(&model, diagnostics);
+        coverage::coverage(&model, diagnostics);
         dead_rules::rules(&model, &self.written, document, diagnostics);
         check::inert_modules(&model, occurs, drawn, diagnostics);
         porting::strings(document, &self.written, diagnostics);

@@ -9,8 +9,7 @@ use crate::scene_checks::is_hidden;
 use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::{
     BUILT_IN_SURFACES, COMMAND_SURFACES, Class, Condition, ConditionStep, ContextPart, DETACH, DRAWN_WORDS,
-    ELASTIC, GROUND, KindId, Model, Pattern, Remedy, Rule, SOURCE, SURFACE_SIZES, Sign, ZeroCrossing,
-    base_of, class_of,
+    ELASTIC, GROUND, KindId, Model, Pattern, Rule, SOURCE, SURFACE_SIZES, base_of, class_of,
 };
 use dlsys_syntax::ast;
 use dlsys_syntax::foreign_syntax;
@@ -221,48 +220,6 @@ pub fn period(declared: Option<(f64, Span)>, model: &Model, diagnostics: &mut Ve
                 .at(span, "it applies to discrete rules, and the model has none")
                 .help("a discrete rule is written `A(x) : x > 3 -> F(x) A(x/2)`"),
         );
-    }
-}
-
-/// Warns of domains that a module can leave without a production.
-pub fn coverage(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
-    for rule in &model.rules {
-        if rule.produces.iter().any(|p| p.guard.is_always()) {
-            continue;
-        }
-        for (i, solve) in rule.solves.iter().enumerate() {
-            let mut said = HashSet::new();
-            for (atom, comparison) in solve.guard.atoms() {
-                let others = rule.solves.iter().enumerate().filter(|(j, s)| *j != i && !s.guard.is_always());
-                let covered = rule.produces.iter().any(|p| p.guard.atoms().any(|(a, _)| a == atom))
-                    || rule.solves.iter().any(|s| s.guard.is_always())
-                    || others.into_iter().any(|(_, s)| s.guard.atoms().any(|(a, _)| a == atom));
-                if !covered && !solve.unreachable[atom] && said.insert(atom) {
-                    // What never changes is not left at the boundary, but a module may be born beyond it.
-                    let (why, sign) = match solve.zero_crossings[atom] {
-                        ZeroCrossing::Constant => {
-                            ("a module for which this is false has no equation and no production", Sign::Any)
-                        }
-                        _ => {
-                            ("when this stops being true, there is no equation and no production", Sign::Zero)
-                        }
-                    };
-                    diagnostics.push(
-                        Diagnostic::warning("no production covers this boundary of the domain")
-                            .at(rule.atoms[atom], why)
-                            .help(match Remedy::new(&model.kinds, rule, atom, comparison, sign) {
-                                Some(Remedy { produce: Some(clause), .. }) => {
-                                    format!("add a clause for it, such as `{clause}`")
-                                }
-                                Some(Remedy { rest: Some(clause), .. }) => {
-                                    format!("add a clause for it, such as `{clause}`")
-                                }
-                                _ => "add a clause for it, such as `if … = … produce …`".to_owned(),
-                            }),
-                    );
-                }
-            }
-        }
     }
 }
 

@@ -22,6 +22,7 @@ mod clauses;
 mod comparisons;
 mod conditions;
 mod contexts;
+mod coverage;
 mod curves;
 mod dead_rules;
 mod declared;

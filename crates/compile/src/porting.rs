@@ -27,7 +27,7 @@ pub fn comments(document: &Document, diagnostics: &mut Vec<Diagnostic>) {
 /// Warns of signs in strings that end something in C.
 pub fn strays(document: &Document, diagnostics: &mut Vec<Diagnostic>) {
     for (span, stray) in &document.strays {
-        let (what, at, help) = match stray {
+        let (what, at, help) = match *stray {
             Stray::Comment => (
                 "`//` begins no comment",
                 "these are two rolls, and the words behind them are modules",
@@ -43,6 +43,19 @@ pub fn strays(document: &Document, diagnostics: &mut Vec<Diagnostic>) {
                 "`#` begins a comment; nothing is included or left out",
                 "write `include \"FILE.dls\"`; lines between `#ifdef` and `#endif` count: delete those that are not meant",
             ),
+            Stray::Definition(number) => {
+                let (name, meaning) = &document.commented[number];
+                let help = foreign_syntax::of_definition(name, meaning);
+                // Where its name is read, an error has said so.
+                if !diagnostics.iter().any(|said| said.help.contains(&help)) {
+                    diagnostics.push(
+                        Diagnostic::warning("this line is a comment")
+                            .at(*span, "`#` begins a comment; nothing is defined")
+                            .help(help),
+                    );
+                }
+                continue;
+            }
             Stray::End => (
                 "`;` does not end a line",
                 "this takes the next colour for what follows",

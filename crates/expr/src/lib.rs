@@ -46,7 +46,7 @@ mod time;
 pub use comparison::{Comparison, Truth};
 pub use curve::{Array, Curve, MAX_POINTS, Part, Sort};
 pub use dual::Dual;
-pub use elimination::eliminate;
+pub use elimination::{determinant, eliminate};
 pub use error::Error;
 pub use field::{FIELD_ARGUMENTS, Field, FieldPart, FieldSlot};
 pub use fold::Fold;

@@ -338,6 +338,11 @@ impl Stepper {
         *most
     }
 
+    /// The length of the step just made.
+    pub fn made(&self) -> f64 {
+        self.step.1
+    }
+
     /// The components, in ascending order, that err by more than is tolerated in the step just made; no more than
     /// [`Stepper::spared`].
     pub fn rough(&self) -> &[u32] {

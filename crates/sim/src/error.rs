@@ -53,6 +53,8 @@ pub enum Unsolved {
     Fading,
     /// The values change faster than they can be followed.
     Rough,
+    /// Two solutions meet.
+    Meeting,
 }
 
 impl Unsolved {
@@ -63,6 +65,7 @@ impl Unsolved {
             Unsolved::NotFinite => "has no value: its equations are undefined",
             Unsolved::Fading => "is hardly determined any more by its equations, which become singular,",
             Unsolved::Rough => "changes too fast to be followed",
+            Unsolved::Meeting => "is not determined any more by its equations, two solutions of which meet,",
         }
     }
 }
@@ -368,7 +371,7 @@ impl Error {
                 "the solution may become infinite here, or the equations jump in a way that no `if` shows; a fixed step (`--method rk4 --step-size H`) shows how it behaves",
             ),
             Error::Unsolved { unknown, .. } => d.help(match unknown.1 {
-                Unsolved::Singular | Unsolved::Fading => "there the equations do not say how the parameter goes on: a double root, or two solutions that meet. Change the equations before this, or end the module's life at a condition that holds earlier",
+                Unsolved::Singular | Unsolved::Fading | Unsolved::Meeting => "there the equations do not say how the parameter goes on: a double root, or two solutions that meet. Change the equations before this, or end the module's life at a condition that holds earlier",
                 Unsolved::Nothing => "the search begins with the value that the module was written with, or had just before: write one closer to the solution, or see whether there is one",
                 Unsolved::NotFinite => "look for a division by zero, or a root or logarithm of a negative number, at the written value too: the search begins there",
                 Unsolved::Rough => "it jumps, or turns without end, in a way that no `if` shows",

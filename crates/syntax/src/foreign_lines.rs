@@ -181,6 +181,8 @@ pub enum Stray {
     End,
     /// A line for the preprocessor of C, which is a comment: `#include "FILE"`.
     Directive,
+    /// A line such as `#define K 0.5`, which is a comment, by its number among those of the document.
+    Definition(usize),
 }
 
 /// The places of such signs: where a line would be strange without them being meant as in C.

@@ -347,7 +347,7 @@ pub fn remainder(x: &str, y: &str) -> String {
 }
 
 /// The places of lines for the preprocessor of C, which are comments in this language. A comment that begins with such a word has a space before it.
-/// Not of `#define`: where its name is read, an error says what to write.
+/// Not of `#define`: see [`commented_definitions`].
 pub fn directives(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1));
     starts.filter_map(|start| {
@@ -366,12 +366,16 @@ pub fn directives(text: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-/// Names and values in lines such as `#define K 0.5`, which are comments in this language.
-pub fn commented_definitions(text: &str) -> impl Iterator<Item = (&str, &str)> {
-    text.lines().filter_map(|line| {
-        let rest = line.trim_start().strip_prefix("#define")?.trim_start_matches([' ', '\t']);
-        let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
-        (end > 0).then(|| (&rest[..end], rest[end..].trim()))
+/// Names and values in lines such as `#define K 0.5`, which are comments in this language, with their places.
+pub fn commented_definitions(text: &str) -> impl Iterator<Item = (usize, &str, &str)> {
+    let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1));
+    starts.filter_map(|start| {
+        let line = text[start..].lines().next()?;
+        let at = line.len() - line.trim_start().len();
+        let rest = line[at..].strip_prefix("#define")?;
+        let name = rest.trim_start_matches([' ', '\t']);
+        let end = name.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(name.len());
+        (end > 0 && name.len() < rest.len()).then(|| (start + at, &name[..end], name[end..].trim()))
     })
 }
 
@@ -487,7 +491,7 @@ mod tests {
     fn definitions_of_the_preprocessor_are_found() {
         let text = "# define a thing\n#define K 0.5\n#define G(x) x*K\n#define\n";
         let found: Vec<_> = commented_definitions(text).collect();
-        assert_eq!(found, [("K", "0.5"), ("G", "(x) x*K")]);
+        assert_eq!(found, [(17, "K", "0.5"), (31, "G", "(x) x*K")]);
         assert!(of_definition("G", "(x) x*K").ends_with("`def G(x) = x*K`"));
         assert!(of_definition("L", "(2*K)").ends_with("`const L = (2*K)`"));
     }

@@ -255,11 +255,17 @@ impl CrossingDetector {
                 tolerance = tolerance.max(noise).max(self.rounding(path, atom, from));
             }
         }
-        let root = match LevelDifference::new(path, atom) {
-            Some(mut plain) => first_root(&mut plain, from, limit, sign, tolerance),
-            None => first_root(&mut self.difference(path, atom), from, limit, sign, tolerance),
+        let Root { position, at, mut after } = loop {
+            let root = match LevelDifference::new(path, atom) {
+                Some(mut plain) => first_root(&mut plain, from, limit, sign, tolerance),
+                None => first_root(&mut self.difference(path, atom), from, limit, sign, tolerance),
+            };
+            let root = root?;
+            match self.leaving(path, atom, (from, start), (root.position, limit), sign) {
+                Some(end) => (from, start) = end,
+                None => break root,
+            }
         };
-        let Root { position, at, mut after } = root?;
         let behind =
             position + if path.rule.jumping_whole[atom] { self.blur(path, atom, position) } else { 0.0 };
         if position < behind && behind < limit {
@@ -303,7 +309,7 @@ impl CrossingDetector {
     }
 
     /// The effect of the rounding of the variables on the difference of two sides; 0 where the difference jumps.
-    fn rounding(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+    pub(super) fn rounding(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
         path.over(at, at, &mut self.bounds);
         for variable in &mut self.bounds {
             let width = 64.0 * f64::EPSILON * variable.value.magnitude();

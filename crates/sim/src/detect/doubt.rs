@@ -103,6 +103,35 @@ impl<F: Function> Function for Raised<'_, F> {
 }
 
 impl CrossingDetector {
+    /// The place up to which a difference that is zero at `from`, but for rounding, is nothing else, and its value there; None if it then has not the
+    /// sign that it was said to get, or if a root that was found is beyond. What does not move at once (`dx/dt = age`) is rounding much longer than
+    /// the resolution of time.
+    pub(super) fn leaving(
+        &mut self,
+        path: &Path,
+        atom: usize,
+        (from, start): (f64, f64),
+        (root, limit): (f64, f64),
+        sign: Sign,
+    ) -> Option<(f64, f64)> {
+        let (side, instant) = (sign_of(sign), path.start.resolution() / path.h);
+        if side == 0.0 || path.rule.jumping_whole[atom] || start.abs() > self.rounding(path, atom, from) {
+            return None;
+        }
+        let mut width = (root - from).max(instant);
+        loop {
+            let to = (from + width).min(limit);
+            let value = self.difference(path, atom).value(to);
+            if value.is_nan() || value.abs() > self.rounding(path, atom, to) {
+                return (to > root && value * side > 0.0).then_some((to, value));
+            }
+            if to >= limit {
+                return None;
+            }
+            width *= 2.0;
+        }
+    }
+
     /// Looks ahead for an atom of which some variable is integrated.
     pub(super) fn look(&mut self, path: &Path, mut query: AtomQuery) -> Lookahead {
         let AtomQuery { atom, limit, sign, tolerance, .. } = query;

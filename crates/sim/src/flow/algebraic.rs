@@ -41,6 +41,7 @@ fn instant_system(
 ) -> (System, Vec<f64>) {
     let rules = &model.rules;
     let mut table = EquationTable::at(at);
+    table.is_complete = true;
     let mut number: HashMap<(ModuleId, usize), u32> = HashMap::new();
     let (mut y, mut values) = (Vec::new(), Vec::new());
     let mut given: Vec<Vec<u32>> = Vec::new();
@@ -162,6 +163,7 @@ impl FlowStage<'_, '_> {
             AlgebraicError::NotFinite(_) => Unsolved::NotFinite,
             AlgebraicError::Fading(_) => Unsolved::Fading,
             AlgebraicError::Rough(_) => Unsolved::Rough,
+            AlgebraicError::Meeting(_) => Unsolved::Meeting,
         };
         Error::Unsolved { site, unknown: Box::new((what, fault)) }
     }

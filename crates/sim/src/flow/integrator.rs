@@ -1,7 +1,7 @@
 //! Steps of controlled error: [`dlsys_ode::Stepper`] with the settings and the statistics of a run, and with algebraic
 //! components that are solved for along with the integrated ones.
 
-use crate::flow::coupled::algebra::AlgebraicError;
+use crate::flow::coupled::blend::BlendError;
 use crate::flow::coupled::equations::Equations;
 use crate::{Settings, Stats};
 use dlsys_ode::{Control, Dense, Method, Rates, Reached, StepSettings, Stepper};
@@ -140,14 +140,15 @@ impl Integrator {
     /// The dense output of the step just made from `y`, with its algebraic components.
     ///
     /// # Errors
-    /// If these cannot be solved for, or cannot be followed; then the size of the next step to be tried is reduced.
+    /// If these cannot be solved for, or cannot be followed; then the size of the next step to be tried is reduced. If two
+    /// solutions meet.
     pub fn blended(
         &mut self,
         equations: &mut Equations,
         y: &[f64],
         settings: &Settings,
         control: &mut Control,
-    ) -> Result<Vec<Dense>, AlgebraicError> {
+    ) -> Result<Vec<Dense>, BlendError> {
         let dense = self.dense(equations, y);
         let h = dense.h;
         let blended = equations.blend(&dense, y, INNER_TOLERANCE * settings.tolerance);
@@ -161,9 +162,15 @@ impl Integrator {
                     }
                 }
             }
-            Err(_) => control.size = SHORTER * h,
+            Err(BlendError::Unsolved(_)) => control.size = SHORTER * h,
+            Err(BlendError::Meeting(_)) => {}
         }
         blended
+    }
+
+    /// The length of the step just made.
+    pub fn made(&self) -> f64 {
+        self.stepper.made()
     }
 
     /// Gives back the memory that only the making of a step takes: see [`Stepper::rest`].

@@ -79,8 +79,12 @@ impl Reader {
         let cut = layout(text);
         self.errors.extend(cut.errors);
         if text.contains("#define") {
-            let known = foreign_syntax::commented_definitions(text);
-            self.document.commented.extend(known.map(|(name, meaning)| (name.into(), meaning.to_owned())));
+            for (at, name, meaning) in foreign_syntax::commented_definitions(text) {
+                let number = self.document.commented.len();
+                self.document.commented.push((name.into(), meaning.to_owned()));
+                let span = Span::new(at, at + "#define".len());
+                self.document.strays.push((span, Stray::Definition(number)));
+            }
         }
         for (at, word) in foreign_syntax::directives(text) {
             self.document.strays.push((Span::new(at, at + word.len()), Stray::Directive));

@@ -3,6 +3,7 @@
 use crate::flow::coupled::algebra::AlgebraicError;
 use crate::flow::coupled::columns::Whole;
 use crate::flow::coupled::lanes::EvaluationPoint;
+use crate::flow::coupled::newton::{Solver, Workspace};
 use crate::flow::coupled::rows::VariableSource;
 use crate::flow::coupled::sections;
 use crate::flow::coupled::system::System;
@@ -92,6 +93,12 @@ impl<'s> Equations<'s> {
         self.system.algebra.solve(&self.system.table, self.rules, tau, inputs, consistent)
     }
 
+    /// The algebraic equations at a time for which the inputs have been read.
+    pub fn solver<'a>(&'a self, tau: f64, memory: &'a mut Workspace) -> Solver<'a> {
+        let System { algebra, table, .. } = self.system;
+        algebra.solver(table, self.rules, tau, &self.memory.inputs, memory)
+    }
+
     /// Solves for the algebraic components of a state.
     pub fn make_consistent(&mut self, tau: f64, y: &mut [f64]) -> Result<(), AlgebraicError> {
         self.complete(tau, y)?;
@@ -162,10 +169,11 @@ impl Equations<'_> {
         others.fold(0.0, |most, (_, value)| value.abs().max(most))
     }
 
-    /// The algebraic equations that become singular at the start of a step, if there are any.
-    pub fn fading(&mut self, y: &[f64]) -> Option<AlgebraicError> {
+    /// The algebraic equations that become singular at the start of a step, if there are any: the reason why it fails.
+    pub fn hindrance(&mut self, y: &[f64]) -> Option<AlgebraicError> {
         self.read_inputs(0.0);
-        self.system.algebra.fading(&self.system.table, self.rules, &self.memory.inputs, y)
+        let fading = self.system.algebra.fading(&self.system.table, self.rules, &self.memory.inputs, y);
+        fading.or_else(|| self.met(y).map(AlgebraicError::Meeting))
     }
 
     /// The error of the algebraic components at the end of a step that follows from those of the integrated ones, in

@@ -8,6 +8,7 @@
 //! couple ─▶ which modules are coupled ─▶ reintegration   the modules around an event, to the end of the common step
 //!                                     └▶ restart ─▶ step  a new common step ─▶ detect ─▶ schedule
 //!                                        step ─▶ repair   stiff members that the step does not resolve
+//! algebra ─▶ newton ─▶ matrix, meeting (where solutions meet) ─▶ blend
 //! system ─▶ rows (table of equations) ─▶ algebra, lanes, aggregates ─▶ equations (right-hand side) ─▶ integrator
 //! columns ─▶ the equations of explicit steps without a table, sections ─▶ of several threads
 //! linear ─▶ exponentials of matrices in place of steps
@@ -21,10 +22,14 @@ pub mod couple;
 pub mod equations;
 pub mod lanes;
 pub mod linear;
+mod matrix;
+mod meeting;
+mod newton;
 pub mod reintegration;
 mod repair;
 mod restart;
 pub mod rows;
+mod search;
 mod sections;
 mod sift;
 mod step;

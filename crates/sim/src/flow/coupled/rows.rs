@@ -50,6 +50,8 @@ pub struct EquationTable {
     /// Some rates depend on `t`, or on `age`.
     pub timed: bool,
     pub aged: bool,
+    /// Rows have the sources of all variables, not only of those that their equations read.
+    pub is_complete: bool,
 }
 
 /// Where a component belongs.

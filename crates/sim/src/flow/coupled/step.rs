@@ -8,8 +8,11 @@ use crate::detect::quiet::Outlook;
 use crate::error::Error;
 use crate::flow::FlowStage;
 use crate::flow::coupled::Coupled;
+use crate::flow::coupled::algebra::AlgebraicError;
+use crate::flow::coupled::blend::BlendError;
 use crate::flow::coupled::columns::Whole;
 use crate::flow::coupled::equations::Equations;
+use crate::flow::coupled::meeting::Meeting;
 use crate::flow::coupled::sift::Outcome;
 use crate::flow::coupled::system::{Membership, System};
 use crate::flow::coupled::traffic::Work;
@@ -31,7 +34,22 @@ const MAX_TRIES: usize = 100;
 const SHORTER: f64 = 0.25;
 
 /// A common step: its end, and its dense output if that has been computed.
-type CommonStep = (Result<SimTime, StepError>, Option<CoupledSolution>);
+type CommonStep = (Result<SimTime, StepFailure>, Option<CoupledSolution>);
+
+/// The reason why no common step can be made.
+enum StepFailure {
+    /// The method fails.
+    Step(StepError),
+    /// Algebraic components cannot be followed.
+    Unsolved(AlgebraicError),
+    /// Two solutions for a component meet at an instant.
+    Meeting(usize, SimTime),
+}
+
+/// A step ends so much, as a part of itself, before the instant at which solutions meet.
+const BEFORE: f64 = 1e-6;
+/// Solutions meet at the start of a step if they do within this part of the stretch in which they were seen to.
+const AT_ONCE: f64 = 1e-8;
 
 impl FlowStage<'_, '_> {
     /// Makes the trajectory of the coupled modules available at an instant: the dense output of the common step, or the
@@ -72,7 +90,14 @@ impl FlowStage<'_, '_> {
             let (step, solution) = self.make_step(from, may_spare);
             let end = match step {
                 Ok(end) => end,
-                Err(error) => return self.fail_step(error, from),
+                Err(StepFailure::Step(error)) => return self.fail_step(error, None, from),
+                Err(StepFailure::Unsolved(error)) => {
+                    return self.fail_step(StepError::ValueNotFinite(error.component()), Some(error), from);
+                }
+                Err(StepFailure::Meeting(component, at)) => {
+                    let owner = self.flows.coupled.system.owner(component, &self.world.tree);
+                    return Err(self.unsolved(AlgebraicError::Meeting(component), owner, at));
+                }
             };
             self.flows.coupled.pending = solution.is_none();
             self.world.coupled = solution;
@@ -104,7 +129,7 @@ impl FlowStage<'_, '_> {
         let work = Work { common: integrator.cost(), regions: reintegration.cost() };
         let longest = traffic.begin(from, members.len(), control.stiff.then_some(work));
         let limits = [self.setup.settings.slice_end(from), longest, self.world.resolved(from)];
-        let limit = limits.into_iter().flatten().reduce(|a, b| if b < a { b } else { a });
+        let mut limit = limits.into_iter().flatten().reduce(|a, b| if b < a { b } else { a });
         let settings = &self.setup.coupled_settings;
         let spared = if may_spare { self.spared() } else { 0 };
         self.flows.coupled.integrator.spare(spared);
@@ -115,6 +140,7 @@ impl FlowStage<'_, '_> {
             let stats = &mut self.log.stats;
             let request = StepRequest { settings, y, start: from, limit };
             let step = integrator.step(request, control, &mut equations, stats);
+            let step = step.map_err(StepFailure::Step);
             if step.is_err() || system.algebra.is_empty() && pulsing.is_empty() {
                 break step;
             }
@@ -122,6 +148,7 @@ impl FlowStage<'_, '_> {
                 true => Ok(vec![integrator.dense(&mut equations, y)]),
                 false => integrator.blended(&mut equations, y, settings, control),
             };
+            let least = 64.0 * from.resolution();
             match stretches {
                 Ok(stretches) => {
                     let found = CoupledSolution::of(stretches);
@@ -129,7 +156,6 @@ impl FlowStage<'_, '_> {
                     self.world.coupled = Some(found);
                     let overlooked = self.first_overlooked(from, h, tries);
                     solution = self.world.coupled.take();
-                    let least = 64.0 * from.resolution();
                     match overlooked {
                         Some(at) if h > least && tries < MAX_TRIES => {
                             tries += 1;
@@ -140,12 +166,23 @@ impl FlowStage<'_, '_> {
                         _ => break step,
                     }
                 }
-                Err(error) => {
+                Err(BlendError::Unsolved(error)) => {
                     tries += 1;
                     stats.rejected += 1;
                     if tries > MAX_TRIES || settings.method.is_fixed_step() {
-                        break Err(StepError::ValueNotFinite(error.component()));
+                        break Err(StepFailure::Unsolved(error));
                     }
+                }
+                // Events before that instant come first, so steps lead up to it.
+                Err(BlendError::Meeting(Meeting { component, position, reach })) => {
+                    tries += 1;
+                    stats.rejected += 1;
+                    let (h, is_fixed) = (integrator.made(), settings.method.is_fixed_step());
+                    let ahead = position * h;
+                    if position <= AT_ONCE * reach || ahead <= least || tries > MAX_TRIES || is_fixed {
+                        break Err(StepFailure::Meeting(component, from.after(ahead)));
+                    }
+                    limit = Some(from.after((1.0 - BEFORE) * ahead));
                 }
             }
         };
@@ -178,8 +215,14 @@ impl FlowStage<'_, '_> {
         overlooked.reduce(f64::min)
     }
 
-    /// Handles a step that fails: a boundary that has been reached there is an event, anything else an error.
-    fn fail_step(&mut self, error: StepError, from: SimTime) -> Result<(), Error> {
+    /// Handles a step that fails: a boundary that has been reached there is an event, anything else an error. `followed`: the reason
+    /// why algebraic components cannot be followed, if that is what fails.
+    fn fail_step(
+        &mut self,
+        error: StepError,
+        followed: Option<AlgebraicError>,
+        from: SimTime,
+    ) -> Result<(), Error> {
         let Coupled { system, y, .. } = &self.flows.coupled;
         let mut equations = Equations::new(system, &self.setup.model.rules, None);
         // Equations without a solution explain more than the failure of a step.
@@ -187,7 +230,8 @@ impl FlowStage<'_, '_> {
         if unsolved.is_none() && self.arrest_coupled(error.component(), from) {
             return Ok(());
         }
-        Err(match unsolved {
+        let is_singular = |error: &AlgebraicError| matches!(error, AlgebraicError::Singular(_));
+        Err(match unsolved.or(followed.filter(is_singular)) {
             Some(unsolved) => {
                 let system = &self.flows.coupled.system;
                 self.unsolved(unsolved, system.owner(unsolved.component(), &self.world.tree), from)
@@ -382,7 +426,7 @@ impl FlowStage<'_, '_> {
         let Coupled { system, y, .. } = &self.flows.coupled;
         let owner = |component: usize| system.owner(component, &self.world.tree);
         if matches!(error, StepError::StepTooSmall(_) | StepError::ValueNotFinite(_))
-            && let Some(unsolved) = Equations::new(system, &self.setup.model.rules, None).fading(y)
+            && let Some(unsolved) = Equations::new(system, &self.setup.model.rules, None).hindrance(y)
         {
             return self.unsolved(unsolved, owner(unsolved.component()), at);
         }
