@@ -6,7 +6,74 @@ use dlsys_diagnostic::{Diagnostic, Span};
 
 /// The error for a discrete rule that is written as in cpfg, given its text and the byte at which it begins.
 pub fn rule(text: &str, start: usize) -> Option<Diagnostic> {
-    label(text, start).or_else(|| probability(text, start))
+    label(text, start)
+        .or_else(|| statements(text, start))
+        .or_else(|| always(text, start))
+        .or_else(|| probability(text, start))
+        .or_else(|| probability_at_the_arrow(text, start))
+}
+
+/// Statements in braces around a condition: `A(x) : {y = x + 1;} y < 2 {z = y;} --> A(y)`.
+fn statements(text: &str, start: usize) -> Option<Diagnostic> {
+    let head = &text[..text.find("->")?];
+    let open = head.find('{')?;
+    let close = open + head[open..].find('}')?;
+    let inside = head[open + 1..close].trim();
+    let (name, value) = inside.split(';').next()?.split_once('=')?;
+    let (name, value) = (name.trim(), value.trim());
+    let is_name = !name.is_empty() && name.chars().all(|c| c.is_alphanumeric() || c == '_');
+    (is_name && !value.is_empty() && head[..open].contains(':')).then(|| {
+        Diagnostic::error("a rule has no statements")
+            .at(Span::new(start + open, start + close + 1), "in cpfg these are carried out when it applies")
+            .help(format!("leave them out, and write `{value}` where `{name}` is read; a `def` names an expression that is long: `def f(x) = x + 1`"))
+    })
+}
+
+/// A condition that always holds: `A(x) : 1 --> F(x)`.
+fn always(text: &str, start: usize) -> Option<Diagnostic> {
+    let arrow = text.find("->")?;
+    let (predecessor, value) = text[..arrow].trim_end_matches('-').split_once(':')?;
+    let at = text.find(':')? + 1 + value.find('1')?;
+    (value.trim() == "1").then(|| {
+        Diagnostic::error("a number is no condition")
+            .at(Span::new(start + at, start + at + 1), "in cpfg a condition that always holds")
+            .help(format!(
+                "leave it out, with its colon: `{} -> {}`",
+                predecessor.trim(),
+                first_line(&text[arrow + 2..])
+            ))
+    })
+}
+
+/// A probability at the arrow, as in print: `A -->(0.3) F`, `A --(0.3)-> F`.
+fn probability_at_the_arrow(text: &str, start: usize) -> Option<Diagnostic> {
+    let arrow = text.find("->")?;
+    let (head, behind) = (text[..arrow].trim_end(), text[arrow + 2..].trim_start());
+    let (predecessor, value, string) = match behind.strip_prefix('(').and_then(|rest| rest.split_once(')')) {
+        Some((value, string)) => (head, value, string),
+        None => {
+            let (predecessor, value) = head.strip_suffix(')')?.rsplit_once('(')?;
+            (predecessor.trim_end().strip_suffix('-')?, value, behind)
+        }
+    };
+    let number = value.trim().parse::<f64>().ok().filter(|value| (0.0..=1.0).contains(value))?;
+    let predecessor = predecessor.trim_end_matches('-').trim();
+    let at = text.find(&format!("({value})"))? + 1;
+    Some(before_its_successor((predecessor, value.trim(), number), string, (start + at, value.len())))
+}
+
+/// The error for a probability that does not stand before its successor.
+fn before_its_successor(
+    (predecessor, value, number): (&str, &str, f64),
+    string: &str,
+    (at, length): (usize, usize),
+) -> Diagnostic {
+    let rest = ((1.0 - number) * 1e6).round() / 1e6;
+    let string = first_line(string);
+    Diagnostic::error("a probability stands before its successor")
+        .at(Span::new(at, at + length), "in cpfg it stands here")
+        .help(format!("write all successors in one rule: `{predecessor} -> {value}: {string} or {rest}: …`"))
+        .help("the values are weights: they need not add up to 1")
 }
 
 /// A label of a production: `p1: A --> F A`, `p1 : A : x > 3 --> F A`.
@@ -37,21 +104,12 @@ fn probability(text: &str, start: usize) -> Option<Diagnostic> {
         (None, Some((predecessor, value))) => (predecessor, successor, value),
         (None, None) => return None,
     };
-    let (predecessor, string, value) = (predecessor.trim(), first_line(string), value.trim());
+    let (predecessor, value) = (predecessor.trim(), value.trim());
     let at = match behind {
         Some(_) => text.rfind(value)?,
         None => text.find(':').and_then(|colon| Some(colon + text[colon..].find(value)?))?,
     };
-    let rest = 1.0 - number(value)?;
-    let rest = (rest * 1e6).round() / 1e6;
-    Some(
-        Diagnostic::error("a probability stands before its successor")
-            .at(Span::new(start + at, start + at + value.len()), "in cpfg it stands here")
-            .help(format!(
-                "write all successors in one rule: `{predecessor} -> {value}: {string} or {rest}: …`"
-            ))
-            .help("the values are weights: they need not add up to 1"),
-    )
+    Some(before_its_successor((predecessor, value, number(value)?), string, (start + at, value.len())))
 }
 
 /// The errors for comments of C in a text, `/* … */` or lines of `// words`, and the text with spaces in their place; what follows a comment that does not end is
@@ -165,9 +223,24 @@ fn stray(code: &str) -> Option<(usize, Stray)> {
     is_behind.then_some((before.len(), Stray::End))
 }
 
-/// The first line of a text, not too long for a message.
+/// The first line of a text, not too long for a message: one that is ends with a module outside of brackets, and a sign that says so.
 fn first_line(text: &str) -> String {
-    text.trim().lines().next().unwrap_or_default().trim().chars().take(60).collect()
+    /// Most bytes.
+    const LONGEST: usize = 60;
+    let line = text.trim().lines().next().unwrap_or_default().trim();
+    if line.len() <= LONGEST {
+        return line.to_owned();
+    }
+    let (mut depth, mut end) = (0_i32, 0);
+    for (at, c) in line.char_indices().take_while(|(at, _)| *at <= LONGEST) {
+        match c {
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth -= 1,
+            c if c.is_whitespace() && depth == 0 => end = at,
+            _ => (),
+        }
+    }
+    format!("{} …", &line[..end]).trim_start().to_owned()
 }
 
 #[cfg(test)]
@@ -185,13 +258,26 @@ mod tests {
             ("p12 : A(x) : x > 3 --> F(x) A(x)", "leave it out: `A(x) : x > 3 --> F(x) A(x)`"),
             ("A --> F A : 0.3", "`A -> 0.3: F A or 0.7: …`"),
             ("A(x) : 0.25 -> F(x)", "`A(x) -> 0.25: F(x) or 0.75: …`"),
+            ("A -->(0.3) F", "`A -> 0.3: F or 0.7: …`"),
+            ("A(x) --(0.3)-> F(x)", "`A(x) -> 0.3: F(x) or 0.7: …`"),
+            ("A(x) : 1 --> F(x)", "leave it out, with its colon: `A(x) -> F(x)`"),
+            ("A(x) : {y=x+1;} y<2 --> A(y)", "write `x+1` where `y` is read"),
+            (
+                "A --> F(1) [ +(30) F(1) ] [ -(30) F(1) ] [ /(137.5) F(1) F(2) F(3) F(4) ] : 0.3",
+                "`A -> 0.3: F(1) [ +(30) F(1) ] [ -(30) F(1) ] … or 0.7: …`",
+            ),
         ] {
             assert!(help(rule(text, 7)).contains(wanted), "{text}: {}", help(rule(text, 7)));
         }
         // A module may have such a name, and a weight such a place.
-        for text in
-            ["p1 : t > 3 -> F", "A(x) : x > 0.3 -> F(x)", "A -> 0.3: F A or 0.7: F", "A : * -> F(0.3)"]
-        {
+        for text in [
+            "p1 : t > 3 -> F",
+            "A(x) : x > 0.3 -> F(x)",
+            "A -> 0.3: F A or 0.7: F",
+            "A : * -> F(0.3)",
+            "A(x) > B(y) : x > 1 -> F",
+            "A : -(1)-(2) < t -> F",
+        ] {
             assert!(rule(text, 0).is_none(), "{text}");
         }
     }

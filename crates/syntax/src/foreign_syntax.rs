@@ -8,7 +8,7 @@ use dlsys_diagnostic::{Diagnostic, Span};
 const PAGE: &str = "the book has a page for this: “Coming from cpfg or L-Py”, docs/src/moving.md";
 
 /// Beginnings of lines, as words and signs, each with its remedy.
-const LINES: [(&[&str], &str); 34] = [
+const LINES: [(&[&str], &str); 35] = [
     (&["elif"], ELIF),
     (&["lsystem", ":"], "remove this line: a file is one model, from its first line to its last"),
     (&["endlsystem"], "remove this line: a model ends with its file"),
@@ -38,6 +38,10 @@ const LINES: [(&[&str], &str); 34] = [
     (&["end", ":"], STATEMENTS),
     (&["endeach", ":"], STATEMENTS),
     (&["endgroup"], "remove this line: rules do not come in groups"),
+    (
+        &["define", ":"],
+        "remove this block: an array of numbers is declared by `const angles = [30, 45, 60]`, and its elements are `angles[i]`; what changes in time is a parameter of a module",
+    ),
     (
         &["print"],
         "a model prints nothing: `dlsys run MODEL` prints the string, and `--measure` what is counted in it",
@@ -191,8 +195,12 @@ pub fn symbol(before: &str, text: &str) -> Option<String> {
             Comma::Color => format!("{COLOR_BEFORE}; `;` alone is the next one"),
             Comma::Either => format!("{NO_COMMAS}; or, if this is cpfg's sign, {COLOR_BEFORE}"),
         },
-        '\'' => "the next colour is written `;` in place of `'`; begin with a colour by its number or its name, `;(n)` or `;(bark)`"
+        '\'' => "the next colour is written `;` in place of `'`: declare the colours of the map in their order, `color bark = \"#7a5a3a\"` for each, and begin the initial string with the first of them, `;(bark)`"
             .to_owned(),
+        '?' if rest.starts_with('(') => "a plant of another model is a module: `plant @Tree from \"tree.dls\"`, then `@Tree(b)` in place of `?(i, s)` … `$`".to_owned(),
+        '@' if rest.starts_with('#') => {
+            "a cross-section is chosen by its name: `contour square = (1, 1) (-1, 1) (-1, -1) (1, -1)`, then `@C(square)`".to_owned()
+        }
         '₀'..='₉' if after_symbol => "the subscript of a symbol begins with `_`: `+_1`".to_owned(),
         _ => return None,
     })
@@ -280,7 +288,9 @@ pub fn commented_widths(text: &str) -> impl Iterator<Item = (usize, &str)> {
         let is_expression = words > 0
             && words <= signs + 1
             && inside.chars().all(|c| c.is_alphanumeric() || c == '_' || spaced(c));
-        (is_expression && !text[line..at].contains(['#', '"'])).then_some((at, inside))
+        // `@#(n)` is another sign.
+        (is_expression && !text[line..at].contains(['#', '"']) && !text[..at].ends_with('@'))
+            .then_some((at, inside))
     })
 }
 
@@ -291,14 +301,19 @@ pub fn function(name: &str, arguments: &[String]) -> Option<String> {
     let both = || format!("{}, {}", argument(0, "a"), argument(1, "b"));
     let call = match name {
         "pow" | "power" => {
-            let simple = |text: &str| text.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '.'));
-            let group = |text: String| if simple(&text) { text } else { format!("({text})") };
+            let (x, n) = (argument(0, "x"), argument(1, "n"));
+            return Some(format!("a power is written `{}^{}`", grouped(&x), grouped(&n)));
+        }
+        "func" => {
             return Some(format!(
-                "a power is written `{}^{}`",
-                group(argument(0, "x")),
-                group(argument(1, "n"))
+                "a function of a file is declared with a name, `curve g from \"FILE.func\"` or `curve g from \"FILE.fset\" item \"NAME\"`, and called by it: `g({})`",
+                argument(1, "x")
             ));
         }
+        "bran" => format!("beta({})", both()),
+        "round" | "rint" => format!("floor({} + 0.5)", argument(0, "x")),
+        "radians" => format!("{}*pi/180", grouped(&argument(0, "x"))),
+        "degrees" => format!("{}*180/pi", grouped(&argument(0, "x"))),
         "ran" => format!("uniform(0, {})", argument(0, "1")),
         "random" | "rand" => "uniform(0, 1)".to_owned(),
         "nran" | "gauss" | "normalvariate" => {
@@ -320,10 +335,14 @@ pub fn function(name: &str, arguments: &[String]) -> Option<String> {
     Some(format!("write `{call}`"))
 }
 
+/// An expression as a part of another.
+fn grouped(text: &str) -> String {
+    let is_simple = text.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '.'));
+    if is_simple { text.to_owned() } else { format!("({text})") }
+}
+
 /// How a remainder is written.
 pub fn remainder(x: &str, y: &str) -> String {
-    let is_simple = |text: &str| text.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '.'));
-    let grouped = |text: &str| if is_simple(text) { text.to_owned() } else { format!("({text})") };
     format!("a remainder is written `{x} - {y}*floor({x}/{y})`", x = grouped(x), y = grouped(y))
 }
 
@@ -358,6 +377,8 @@ pub fn commented_definitions(text: &str) -> impl Iterator<Item = (&str, &str)> {
 
 /// The hint for an unknown name that such a line mentions.
 pub fn of_definition(name: &str, meaning: &str) -> String {
+    let meaning = meaning.split("/*").next().unwrap_or_default();
+    let meaning = meaning.split("//").next().unwrap_or_default().trim();
     match meaning.strip_prefix('(').and_then(|rest| rest.split_once(')')) {
         // `#define F(x) …`, and not `#define K (2*L)`.
         Some((formals, body)) if !body.trim().is_empty() => {
@@ -389,7 +410,19 @@ mod tests {
         assert_eq!(call("pow", &["x + 1", "2"]), "a power is written `(x + 1)^2`");
         assert_eq!(call("ran", &["10"]), "write `uniform(0, 10)`");
         assert_eq!(call("nran", &[]), "write `normal(mean, deviation)`");
+        assert_eq!(call("bran", &["2", "5"]), "write `beta(2, 5)`");
+        assert_eq!(call("radians", &["x + 1"]), "write `(x + 1)*pi/180`");
+        assert_eq!(call("round", &["x/2"]), "write `floor(x/2 + 0.5)`");
+        assert!(call("func", &["1", "t/2"]).ends_with("called by it: `g(t/2)`"));
         assert!(function("sin", &[]).is_none());
+    }
+
+    #[test]
+    fn a_definition_leaves_its_comment_behind() {
+        for meaning in ["20 /* depth */", "20 // depth", "20"] {
+            assert!(of_definition("D", meaning).ends_with("write `const D = 20`"), "{meaning}");
+        }
+        assert!(of_definition("f", "(x) (x*x) /* a square */").ends_with("write `def f(x) = (x*x)`"));
     }
 
     #[test]
@@ -398,7 +431,10 @@ mod tests {
         assert!(symbol("", "~leaf").is_some_and(|help| help.contains("surface @leaf from \"leaf.s\"")));
         assert!(symbol("", "_(0.5)F").is_some_and(|help| help.contains("`!(0.5)`")));
         assert!(symbol("F ", ",(3)").is_some_and(|help| help.contains("`;(3)`")));
-        assert!(symbol("F ", "F").is_none());
+        assert!(symbol("F ", "?(1, 2) X").is_some_and(|help| help.contains("`plant @Tree from")));
+        assert!(symbol("F ", "@#(2)").is_some_and(|help| help.contains("`@C(square)`")));
+        assert!(symbol("F ", "F").is_none() && symbol("F ", "? ").is_none());
+        assert!(commented_widths("axiom: A @#(2)").next().is_none());
     }
 
     #[test]
