@@ -14,10 +14,10 @@ use super::shared::{Scheduler, SharedArgs};
 use crate::compile::Setting;
 use crate::diagnostic::{Diagnostic, Span};
 use crate::model::Frames;
-use crate::render::{Layout, View};
+use crate::render::{Layout, Survey, View};
 use crate::scene::Scene;
 use crate::session::{Detail, DrawError, Nursery, Session, SwayReport};
-use crate::sim::{self, Settings, Simulation, Stats};
+use crate::sim::{self, Settings, Simulation, Stats, brief};
 use crate::tree::ModuleString;
 use crate::turtle;
 
@@ -352,7 +352,8 @@ impl ModelRun {
         let scenery = &self.session.model.scenery;
         let has_camera = args.camera.is_some() || args.view.is_none() && scenery.camera.is_some();
         let has_sky = args.sky.is_some() || scenery.sky.is_some();
-        if has_camera || args.perspective.is_some() || !has_sky || scenery.ground.is_none() {
+        let has_floor = args.ground.is_some() || scenery.ground.is_some();
+        if has_camera || args.perspective.is_some() || !has_sky || !has_floor {
             return;
         }
         let view = args.view.as_deref().and_then(|view| view.parse().ok()).unwrap_or(View::FRONT);
@@ -407,9 +408,19 @@ impl ModelRun {
         }
     }
 
-    /// Adds a warning if nothing is drawn in any frame.
-    pub fn note_what_is_seen(&self, bounds: bool) {
-        if !bounds {
+    /// Adds a warning if nothing is drawn in any frame, or little but the width of a stem.
+    pub fn note_what_is_seen(&self, survey: &Survey) {
+        if let Some((widest, extent)) = survey.too_wide() {
+            let width = brief(widest.width, 4);
+            let scale = brief(extent / (20.0 * widest.width), 1);
+            let warning = Diagnostic::warning("a stem is wider than half of all that is drawn is long")
+                .at(widest.span, format!("{width} wide at t = {}, and all is {} long", brief(widest.time, 6), brief(extent, 4)))
+                .help(format!(
+                    "widths are lengths in scene units, as those of `F`; in cpfg they are pixels: scale them, such as `!({scale}*w)`"
+                ));
+            self.note(vec![warning]);
+        }
+        if survey.fit().bounds.is_none() {
             let warning = Diagnostic::warning("nothing is drawn in any frame").help(
                 "the turtle draws F, surfaces such as @L, and what `interpret` says of other modules: `interpret A(x): F(x)`",
             );

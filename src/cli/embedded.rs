@@ -5,7 +5,7 @@ use clap::Parser;
 
 use super::args::{Action, Command};
 use super::common::{Failure, ModelRun};
-use super::{explain, render, report};
+use super::{explain, render, report, tips};
 use crate::session::Session;
 
 /// Runs a command; `words` are its name and arguments, without the model.
@@ -25,6 +25,7 @@ pub fn run(session: &Session, words: &[String]) -> Result<(), Failure> {
     let mut command = match Command::try_parse_from(&line) {
         Ok(command) => command,
         Err(error) => {
+            let error = tips::improved(error);
             return match error.use_stderr() {
                 true => Err(Failure::Usage(error.to_string())),
                 false => error.print().map_err(super::common::out_error),

@@ -302,7 +302,7 @@ fn measure(order: &Order<'_>, run: &ModelRun, clock: &mut Clock) -> Result<(Surv
     });
     drop(progress);
     if measured.is_ok() {
-        run.note_what_is_seen(survey.fit().bounds.is_some());
+        run.note_what_is_seen(&survey);
     }
     run.warn();
     events.map_or(Ok(()), EventLog::finish)?;

@@ -26,6 +26,7 @@ pub(crate) mod run;
 mod shared;
 mod shell;
 mod specimens;
+mod tips;
 mod values;
 mod verify;
 mod view;
@@ -52,6 +53,7 @@ fn command_line() -> u8 {
     let mut command = match Command::try_parse() {
         Ok(command) => command,
         Err(error) => {
+            let error = tips::improved(error);
             // Help and version are answers, not errors; clap knows which stream they belong on.
             if let Err(Failure::Model(message)) = error.print().map_err(common::out_error) {
                 tell(&message);

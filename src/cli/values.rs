@@ -140,6 +140,21 @@ pub(super) fn sky(text: &str) -> Result<Sky, String> {
     }
 }
 
+/// The height of a floor, and its colour if it is given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ground(pub f64, pub Option<Color>);
+
+pub(super) fn ground(text: &str) -> Result<Ground, String> {
+    let (height, color) = text.split_once(',').map_or((text, None), |(height, color)| (height, Some(color)));
+    let height = height.trim().parse().ok().filter(|height: &f64| height.is_finite());
+    let color = color.map(|color| background(color.trim()).ok().and_then(|Background(color)| color));
+    match (height, color) {
+        (Some(height), None) => Ok(Ground(height, None)),
+        (Some(height), Some(Some(color))) => Ok(Ground(height, Some(color))),
+        _ => Err("expected a height, like 0, or a height and a colour, like \"0,#9aa35f\"".to_owned()),
+    }
+}
+
 /// Three finite numbers with commas between them.
 fn triple(text: &str) -> Option<[f64; 3]> {
     let numbers: Vec<f64> = text.split(',').map(|x| x.trim().parse().ok()).collect::<Option<_>>()?;

@@ -176,7 +176,7 @@ fn record(run: &ModelRun, accuracy: Option<f64>) -> Result<Recording, Failure> {
     })?;
     drop(progress);
     let mut fit = survey.fit();
-    run.note_what_is_seen(fit.bounds.is_some());
+    run.note_what_is_seen(&survey);
     run.warn();
     if let Some(accuracy) = accuracy {
         fit = fit.with_accuracy(accuracy);

@@ -8,7 +8,7 @@ use super::extent::{Extent, Shadow};
 use super::light::Light;
 use super::tube::TubeStyle;
 use super::{Page, View, number, painter};
-use dlsys_geometry::scene::{Bounds, Point, Scene, Surroundings, Viewpoint, Width, sin_cos_degrees};
+use dlsys_geometry::scene::{Bounds, Point, Scene, Surroundings, Viewpoint, Widest, Width, sin_cos_degrees};
 
 /// Drawings less deep than this part of their extent are flat.
 const FLAT: f64 = 1e-6;
@@ -38,6 +38,7 @@ pub struct Survey {
     is_lit: bool,
     /// The surroundings of the first frame.
     first: Option<Surroundings>,
+    widest: Option<Widest>,
 }
 
 impl Survey {
@@ -59,6 +60,7 @@ impl Survey {
             has_soil: false,
             is_lit: false,
             first: None,
+            widest: None,
         }
     }
 
@@ -104,6 +106,7 @@ impl Survey {
         self.is_lit |= around.sun.is_some() || around.sky.is_some() || around.floor.is_some();
         self.has_solids |= scene.palette.has_textures() || scene.terrain.is_some();
         self.has_soil |= scene.terrain.is_some();
+        self.note_widest(scene.widest);
         self.crowd.merge(Crowd::of(scene));
     }
 
@@ -118,7 +121,26 @@ impl Survey {
         if self.first.is_none() {
             self.first.clone_from(&other.first);
         }
+        self.note_widest(other.widest);
         self.seen.merge(&other.seen);
+    }
+
+    /// The widest of all; of some that are alike that of the earliest frame.
+    fn note_widest(&mut self, other: Option<Widest>) {
+        let rank = |widest: &Widest| (widest.width, -widest.time);
+        if let Some(other) = other
+            && self.widest.is_none_or(|known| rank(&other) > rank(&known))
+        {
+            self.widest = Some(other);
+        }
+    }
+
+    /// The widest stem and the extent of all points, in scene units, if `!` makes it wider than half of that: hardly meant, as widths are lengths.
+    pub fn too_wide(&self) -> Option<(Widest, f64)> {
+        let extent = self.space.extent();
+        self.widest
+            .filter(|widest| extent > 0.0 && widest.width > 0.5 * extent)
+            .map(|widest| (widest, extent))
     }
 
     /// The surroundings of the first frame.

@@ -6,9 +6,9 @@ use clap::Args;
 
 use crate::cli::shared::{SharedArgs, Topology};
 use crate::cli::values::{
-    Background, LineWidth, RenderFormat, Seeds, Sky, background, bend_pixels, bytes, camera, columns,
-    direction, field_of_view, layout, line_width, pixels, positive, render_format, seeds, shutter, size, sky,
-    threads, turn, zoom,
+    Background, Ground, LineWidth, RenderFormat, Seeds, Sky, background, bend_pixels, bytes, camera, columns,
+    direction, field_of_view, ground, layout, line_width, pixels, positive, render_format, seeds, shutter,
+    size, sky, threads, turn, zoom,
 };
 use crate::render::Layout;
 use crate::scene::{Vector, Viewpoint};
@@ -106,6 +106,11 @@ pub struct RenderArgs {
     /// Colours of the sky at the zenith and at the horizon, such as "#6fa3e0,#e8f0f8": light from all over it, and the background
     #[arg(long, value_name = "COLOUR,COLOUR", value_parser = sky)]
     pub sky: Option<Sky>,
+    /// A floor without end at this height, in scene units, which takes up shadows; and its colour, such as "0,#9aa35f"
+    ///
+    /// It is seen only: things that fall stop at the `ground` of the model.
+    #[arg(long, value_name = "H[,COLOUR]", allow_hyphen_values = true, value_parser = ground)]
+    pub ground: Option<Ground>,
     /// Largest distance of the drawing from a curved surface, in scene units [default: 1/2000 of the extent of the
     /// whole animation]
     ///

@@ -5,7 +5,7 @@ use crate::cli::args::RenderArgs;
 use crate::cli::common::{Failure, cores};
 use crate::cli::one_file;
 use crate::cli::shared::Topology;
-use crate::cli::values::{Background, LineWidth, RenderFormat, Sky};
+use crate::cli::values::{Background, Ground, LineWidth, RenderFormat, Sky};
 use crate::render::{CAMERA_SHAPE, Content, Fit, Format, Layout, Page, Picture, Size, Spacing, Survey, View};
 use crate::scene::Surroundings;
 use crate::session::Detail;
@@ -21,7 +21,8 @@ pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
         sun: args.light,
         sky: args.sky.map(|Sky(colors)| colors),
         camera: args.camera,
-        ..Surroundings::default()
+        floor: args.ground.map(|Ground(height, _)| height),
+        floor_color: args.ground.and_then(|Ground(_, color)| color),
     };
     let survey = Survey::new(view).with_surroundings(declared).with_zoom(args.zoom.unwrap_or(1.0));
     let survey = if args.line_width.is_some() { survey.with_one_width() } else { survey };
@@ -35,7 +36,7 @@ pub fn survey(args: &RenderArgs) -> Result<Survey, Failure> {
 }
 
 /// Flags that are for pictures, and whether they are given.
-pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 11] {
+pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 12] {
     [
         ("--perspective", args.perspective.is_some()),
         ("--camera", args.camera.is_some()),
@@ -44,6 +45,7 @@ pub fn of_pictures(args: &RenderArgs) -> [(&'static str, bool); 11] {
         ("--zoom", args.zoom.is_some()),
         ("--light", args.light.is_some()),
         ("--sky", args.sky.is_some()),
+        ("--ground", args.ground.is_some()),
         ("--width", args.width.is_some()),
         ("--size", args.size.is_some()),
         ("--background", args.background.is_some()),

@@ -273,7 +273,7 @@ impl Render<'_> {
         });
         drop(progress);
         if measured.is_ok() {
-            self.run.note_what_is_seen(survey.fit().bounds.is_some());
+            self.run.note_what_is_seen(&survey);
         }
         self.run.warn();
         events.map_or(Ok(()), EventLog::finish)?;

@@ -47,7 +47,7 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 use std::sync::Arc;
 
-use dlsys_diagnostic::Diagnostic;
+use dlsys_diagnostic::{Diagnostic, Span};
 use dlsys_model::Appearance;
 use dlsys_tree::Lineage;
 
@@ -158,6 +158,19 @@ pub struct Scene {
     pub surroundings: Surroundings,
     /// Warnings: elements that are drawn, but hardly as they were meant.
     pub warnings: Vec<Diagnostic>,
+    /// The greatest width that `!` sets, where more than a few stems are drawn.
+    pub widest: Option<Widest>,
+}
+
+/// The width of a stem, and where it is set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Widest {
+    /// In scene units.
+    pub width: f64,
+    /// The place in the text of the model.
+    pub span: Span,
+    /// The time of the string.
+    pub time: f64,
 }
 
 /// Takes in the extent of a scene: points whose hull contains all of it.
@@ -197,6 +210,7 @@ impl Scene {
         self.plants.clear();
         self.surroundings = Surroundings::default();
         self.warnings.clear();
+        self.widest = None;
         self.lacked_accuracy = false;
     }
 

@@ -184,6 +184,8 @@ pub(super) enum Remark {
     NegativeWidth(f64),
     /// A colour of this number, and how many there are.
     NoColor(f64, usize),
+    /// `;` alone behind the last colour: the number, and how many there are.
+    NoNextColor(f64, usize),
     /// A gradient of this number, without a place in it.
     GradientWithoutPlace(usize),
     NoContour(f64, usize),
@@ -257,6 +259,14 @@ fn warning(remark: Remark, model: &Model, span: Option<Span>, time: f64) -> Diag
             "there is no such colour".to_owned(),
             format!("colour {} at t = {time}; beyond the last one they begin again at 1", short(number)),
             format!("choose a number from 0 to {count}, or declare a colour and write its name: `color rose = \"#e573a5\"`, `;(rose)`"),
+        ),
+        Remark::NoNextColor(number, count) => (
+            "there is no next colour".to_owned(),
+            format!("colour {} of {count} at t = {time}; beyond the last one they begin again at 1", short(number)),
+            match &appearance.colors[..] {
+                [] => "declare the colours in their order, `color bark = \"#7a5a3a\"`, and begin with the first of them by its name, `;(bark)`".to_owned(),
+                [first, ..] => format!("declare as many colours as there are steps, in their order, and begin with the first by its name, such as `;({})`", first.name),
+            },
         ),
         Remark::GradientWithoutPlace(index) => {
             let name = appearance.gradients.get(index).map_or("leaf", |g| &*g.name);
@@ -337,7 +347,7 @@ fn warning(remark: Remark, model: &Model, span: Option<Span>, time: f64) -> Diag
 
 /// Where the text says how a module is drawn: in the `interpret` that is being drawn, in the production that makes such
 /// modules, or in the initial string. Where it cannot be told which module of that it is, the whole; of several productions
-/// the first.
+/// the first that makes such a module at this place, or else the first.
 pub(super) fn place(
     model: &Model,
     kind: KindId,
@@ -356,12 +366,9 @@ pub(super) fn place(
     }
     let productions = model.rules.iter().flat_map(|rule| &rule.produces);
     let makes = |p: &&Produce| p.outcome.successors.iter().any(|s| s.kinds().any(|made| made == kind));
-    let mut productions = productions.filter(makes);
-    let first = productions.next()?;
-    match (&first.outcome.successors[..], productions.next()) {
-        ([successor], None) => of(successor).or(known(first.span)),
-        _ => known(first.span),
-    }
+    let mut productions = productions.filter(makes).peekable();
+    let whole = productions.peek().and_then(|first| known(first.span));
+    productions.flat_map(|production| &production.outcome.successors).find_map(of).or(whole)
 }
 
 /// The place of the module of this kind in a drawing that has no other.

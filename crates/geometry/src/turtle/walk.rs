@@ -15,13 +15,15 @@ use super::free::{FreePart, Passive, SolidBody};
 use super::patch::OpenPatches;
 use super::skeleton::{Origin, Recorder, Skeleton};
 use super::{COORDINATE_LIMIT, Pose, SMALLEST_LENGTH, shapes};
-use crate::scene::{MaterialId, Owner, OwnerId, Point, Scene, Vector, Width};
+use crate::scene::{MaterialId, Owner, OwnerId, Point, Scene, Vector, Widest, Width};
 use dlsys_diagnostic::Span;
 use dlsys_model::{KindId, Model};
 use dlsys_tree::Lineage;
 
 /// The factor by which `!` without a parameter multiplies the width.
 const THINNING: f64 = 0.7;
+/// Stems from which on a drawing is none of a single body.
+const FEW: usize = 3;
 
 /// The module of the string that is being drawn.
 #[derive(Clone, Copy)]
@@ -110,6 +112,8 @@ pub(super) struct Walk<'a> {
     remarks: Remarks,
     /// How far stems are from their shape at rest.
     strains: Option<&'a dyn Strains>,
+    /// The greatest width that is set and drawn, and by what it was set.
+    widest: Option<(f64, (Option<(usize, KindId)>, DrawnModule))>,
     /// What is noted for the skeleton.
     recorder: Option<Recorder>,
     /// Number of brackets of the string around the module that is being drawn.
@@ -165,6 +169,7 @@ impl<'a> Walk<'a> {
             time,
             remarks: Remarks::default(),
             strains: None,
+            widest: None,
             recorder: None,
             depth: 0,
             stems_drawn: 0,
@@ -274,6 +279,12 @@ impl<'a> Walk<'a> {
             (self.inside, self.drawn) = open.begun;
             self.remark(Remark::PolygonNotClosed);
         }
+        if let Some((width, (inside, drawn))) = self.widest
+            && self.scene.segments.len() >= FEW
+        {
+            let span = error::place(self.model, drawn.kind, drawn.lineage, inside);
+            self.scene.widest = span.map(|span| Widest { width, span, time: self.time });
+        }
     }
 
     /// Executes the command of a module of this kind.
@@ -312,6 +323,9 @@ impl<'a> Walk<'a> {
                 self.state.color = match given {
                     Some(number) => (number, read.get(1).copied().unwrap_or(0.0)),
                     None => (self.state.color.0 + 1.0, 0.0),
+                };
+                if given.is_none() {
+                    self.check_next_color();
                 }
             }
             Command::Push => {
@@ -414,6 +428,15 @@ impl<'a> Walk<'a> {
             self.remark(Remark::NoColor(number, count));
         } else if !has_place && number > colors as f64 {
             self.remark(Remark::GradientWithoutPlace(number as usize - colors - 1));
+        }
+    }
+
+    /// Warns if the next colour is that behind the last one.
+    fn check_next_color(&mut self) {
+        let count: usize = self.scene.palette.counts().iter().sum();
+        let number = self.state.color.0.round();
+        if number > count as f64 {
+            self.remark(Remark::NoNextColor(number, count));
         }
     }
 

@@ -160,6 +160,7 @@ impl Walk<'_> {
             if let Some(before) = follows {
                 self.check_step(before, material, node);
             }
+            self.note_width();
             let segment = Segment {
                 start,
                 end,

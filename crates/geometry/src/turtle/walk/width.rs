@@ -30,6 +30,16 @@ impl Walk<'_> {
         }
     }
 
+    /// Notes the width of a segment if none before was as wide.
+    pub(super) fn note_width(&mut self) {
+        if let Width::Set(width) = self.state.width
+            && self.widest.is_none_or(|(widest, _)| width > widest)
+            && let Some(set_by) = self.state.set_by
+        {
+            self.widest = Some((width, set_by));
+        }
+    }
+
     /// Warns if a stem of the default width is drawn by what should press into soil or carry what falls.
     pub(super) fn check_body(&mut self) {
         let scenery = &self.model.scenery;
