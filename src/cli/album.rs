@@ -156,7 +156,11 @@ mod tests {
 
     #[test]
     fn of_a_scene_that_an_accuracy_would_change_the_string_is_kept() {
-        let bent = || Scene { lacked_accuracy: true, ..scene(3) };
+        let bent = || {
+            let mut scene = scene(3);
+            scene.lacked_accuracy = true;
+            scene
+        };
         let album = Album::default();
         assert!(album.keep((0, 2), bent(), (string(2), 7)).is_some());
         assert!(album.keep((1, 2), bent(), (string(ROOM / 8), 8)).is_some(), "no room");

@@ -352,7 +352,8 @@ impl ModelRun {
         let scenery = &self.session.model.scenery;
         let has_camera = args.camera.is_some() || args.view.is_none() && scenery.camera.is_some();
         let has_sky = args.sky.is_some() || scenery.sky.is_some();
-        if has_camera || args.perspective.is_some() || !has_sky || scenery.ground.is_none() {
+        let has_floor = args.ground.is_some() || scenery.ground.is_some();
+        if has_camera || args.perspective.is_some() || !has_sky || !has_floor {
             return;
         }
         let view = args.view.as_deref().and_then(|view| view.parse().ok()).unwrap_or(View::FRONT);

@@ -102,6 +102,29 @@ fn params_are_set_from_outside_within_their_range() {
     assert!(status == 2 && message.contains("declare it with `param`"), "{message}");
 }
 
+/// Widths are lengths, and pixels in cpfg; the warning marks the module that sets them, in the first of several rules that could.
+#[test]
+fn a_stem_that_is_wider_than_the_drawing_is_long_is_reported() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    let rules = "A(l, w) --> !(w) F(l) [ &(45) B(l*0.6, w*0.707) ] /(137.5) A(l*0.9, w*0.707)\n\
+        B(l, w) --> !(w) F(l) [ -(45) B(l*0.6, w*0.707) ] B(l*0.9, w*0.707)\n";
+    let warned = |axiom: &str| {
+        std::fs::write(path("tree.dls"), format!("axiom: {axiom}\n{rules}")).expect("written");
+        let done = dlsys(&["render", &path("tree.dls"), "--at", "5", "-o", &path("tree.svg"), "--force"]);
+        assert!(done.status.success(), "{done:?}");
+        text(&done.stderr)
+    };
+    let said = warned("A(1, 10)");
+    assert!(said.contains("warning: a stem is wider than half of all that is drawn is long"), "{said}");
+    assert!(said.contains("tree.dls:2:13\n") && said.contains("| "), "{said}");
+    assert!(said.contains("10 wide at t = 5, and all is ") && said.contains("*w)`"), "{said}");
+    assert!(!warned("A(1, 0.1)").contains("wider than half"));
+    // A body of one piece is as wide as it is meant to be.
+    std::fs::write(path("ball.dls"), "initial string: !(1) F(1)").expect("written");
+    good(&["render", &path("ball.dls"), "--at", "0", "-o", &path("ball.svg"), "--quiet"]);
+}
+
 #[test]
 fn faults_have_their_exit_status() {
     let model = "tests/paper-models/leaf.dls";

@@ -224,6 +224,19 @@ fn a_report_keeps_within_its_time_and_says_what_it_left_out() {
     assert!(!table.contains("left out") && table.matches("  right\n").count() == left_out + rows, "{table}");
 }
 
+/// Where a run that others are compared with takes too long, the study ends earlier and says so; not where times are asked for.
+#[test]
+fn a_report_of_a_large_model_ends_at_an_earlier_time() {
+    let common = ["models/sapling.dls", "--runs", "1", "--methods", "dopri5", "--budget", "2"];
+    let table = good(&common);
+    let said = "left out, as it takes longer than `--budget 2`: a larger one goes further, `--at 16` to the end in any case";
+    assert!(table.contains("\ngrowth from t = ") && table.contains(said), "{table}");
+    assert!(table.contains("from t = 0 to ") && !table.contains("from t = 0 to 16:"), "{table}");
+    assert!(table.matches("  right\n").count() > 0, "{table}");
+    let table = good(&[&common[..], &["--at", "1,2"]].concat());
+    assert!(table.contains("at 2 times from t = 1 to 2:") && !table.contains("longer than"), "{table}");
+}
+
 /// Runs the hard cases of a folder with one file.
 fn hard(file: &str) -> (Option<i32>, String, String) {
     let folder = tempfile::tempdir().expect("a folder");
@@ -330,7 +343,7 @@ fn scenes_are_studied_by_tolerance() {
         interpret Hang: Petal\ninterpret Loose: Petal\ninterpret Petal: f(6) &(40) @P(1)\ninterpret Board: !(0.5) F(4)\n";
     std::fs::write(&model, text).expect("written");
     let out = folder.path().to_str().expect("UTF-8");
-    let table = good(&[model.to_str().expect("UTF-8"), "--methods", "auto", "-o", out]);
+    let table = good(&[model.to_str().expect("UTF-8"), "--methods", "auto", "--budget", "200", "-o", out]);
     assert!(table.contains("what falls and hangs, at 6 times, against 1e-6"), "{table}");
     let lines = fields(&read(&folder.path().join("drop-scene.csv")));
     let errors: Vec<f64> =

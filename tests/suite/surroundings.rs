@@ -305,7 +305,7 @@ fn a_report_compares_methods_of_bending() {
     // Turbulence costs milliseconds an instant.
     let smooth = GUSTS.replace(" turbulence 0.3 scale 4", "").replace("3 + sin(t)", "9 + 6 * sin(4 * t)");
     let folder = folder(&[("gusts.dls", &smooth)]);
-    let table = good(&folder, "report gusts.dls --methods auto --runs 1 --time-limit 2 -o out");
+    let table = good(&folder, "report gusts.dls --methods auto --runs 1 --time-limit 2 --budget 40 -o out");
     assert!(table.contains("stems that bend, at 5 times, against ros"), "{table}");
     let csv = std::fs::read_to_string(folder.path().join("out/gusts-stems.csv")).expect("written");
     let error = |start: &str| -> f64 {

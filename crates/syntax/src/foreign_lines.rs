@@ -56,7 +56,7 @@ fn probability_at_the_arrow(text: &str, start: usize) -> Option<Diagnostic> {
             (predecessor.trim_end().strip_suffix('-')?, value, behind)
         }
     };
-    let number: f64 = value.trim().parse().ok().filter(|value| (0.0..=1.0).contains(value))?;
+    let number = value.trim().parse::<f64>().ok().filter(|value| (0.0..=1.0).contains(value))?;
     let predecessor = predecessor.trim_end_matches('-').trim();
     let at = text.find(&format!("({value})"))? + 1;
     Some(before_its_successor((predecessor, value.trim(), number), string, (start + at, value.len())))

@@ -8,7 +8,7 @@ use dlsys_diagnostic::{Diagnostic, Span};
 const PAGE: &str = "the book has a page for this: “Coming from cpfg or L-Py”, docs/src/moving.md";
 
 /// Beginnings of lines, as words and signs, each with its remedy.
-const LINES: [(&[&str], &str); 34] = [
+const LINES: [(&[&str], &str); 35] = [
     (&["elif"], ELIF),
     (&["lsystem", ":"], "remove this line: a file is one model, from its first line to its last"),
     (&["endlsystem"], "remove this line: a model ends with its file"),

@@ -177,6 +177,14 @@ fn warnings(modules: &[(&str, &[f64])]) -> Vec<String> {
 }
 
 #[test]
+fn the_colour_behind_the_last_is_reported() {
+    let pair: [(&str, &[f64]); 2] = [(";", &[]), ("F", &[1.0])];
+    let steps = |count: usize| warnings(&vec![pair; count].concat());
+    assert_eq!(steps(12), [""; 0], "there are twelve without a declaration");
+    assert_eq!(steps(13), ["there is no next colour"]);
+}
+
+#[test]
 fn a_step_of_the_width_is_reported_where_nothing_hides_it() {
     let step: [(&str, &[f64]); 4] = [("!", &[0.4]), ("F", &[1.0]), ("!", &[0.2]), ("F", &[1.0])];
     assert_eq!(warnings(&step), ["the width of a stem changes at once"]);
