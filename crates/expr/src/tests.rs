@@ -173,7 +173,8 @@ fn plain_numbers_are_to_the_bit_those_of_the_common_interpreter() {
             program.eval(&values, &mut Vec::new(), &mut plain);
             program.eval(&duals, &mut Vec::new(), &mut common);
             for ((plain, common), (name, _)) in plain.iter().zip(&common).zip(&list) {
-                let same = plain.to_bits() == common.value.to_bits() || plain.is_nan() && common.value.is_nan();
+                let same =
+                    plain.to_bits() == common.value.to_bits() || plain.is_nan() && common.value.is_nan();
                 assert!(same, "{name} at {x}, {y}: {plain}, not {}", common.value);
             }
         }
