@@ -112,7 +112,7 @@ pub struct Program {
     arrays: Vec<Arc<Array>>,
     fields: Vec<FieldSlot>,
     /// The code for plain numbers.
-    plain: Option<Plain>,
+    plain: Option<Box<Plain>>,
 }
 
 /// The curves, arrays or fields that a program reads, each once.
@@ -287,7 +287,7 @@ impl Program {
         reads.dedup();
         let Compiler { curves, arrays, fields, registers, .. } = compiler;
         let (curves, arrays, fields, registers) = (curves.all, arrays.all, fields.all, registers as usize);
-        let plain = Plain::new(&code, registers);
+        let plain = Plain::new(&code, registers).map(Box::new);
         Program { constants, curves, arrays, fields, plain, code, outputs, variables, registers, reads }
     }
 
