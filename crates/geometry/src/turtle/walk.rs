@@ -53,7 +53,7 @@ struct State {
     /// Number of segments on this axis since the width was set.
     run: usize,
     /// The interpretation and the module that set the width with `!`.
-    set_by: Option<(Option<(usize, KindId)>, DrawnModule)>,
+    set_by: Option<Place>,
     /// What stands where the turtle is.
     node: Node,
     /// The tissue of stems that give way, by its number from 0; `None` for rigid ones.
@@ -79,13 +79,16 @@ enum Node {
     Organ,
 }
 
+/// A module that draws, in the interpretation and the part of it that draws it.
+pub(super) type Place = (Option<(usize, KindId)>, DrawnModule);
+
 /// A polygon that is open.
 struct Outline {
     vertices: Vec<Point>,
     /// Number of vertices made, coinciding ones included.
     made: usize,
     /// The interpretation and the module that began it.
-    begun: (Option<(usize, KindId)>, DrawnModule),
+    begun: Place,
 }
 
 /// A turtle that walks through a string and draws into a scene.
@@ -113,7 +116,7 @@ pub(super) struct Walk<'a> {
     /// How far stems are from their shape at rest.
     strains: Option<&'a dyn Strains>,
     /// The greatest width that is set and drawn, and by what it was set.
-    widest: Option<(f64, (Option<(usize, KindId)>, DrawnModule))>,
+    widest: Option<(f64, Place)>,
     /// What is noted for the skeleton.
     recorder: Option<Recorder>,
     /// Number of brackets of the string around the module that is being drawn.
