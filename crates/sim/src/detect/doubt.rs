@@ -115,7 +115,8 @@ impl CrossingDetector {
         sign: Sign,
     ) -> Option<(f64, f64)> {
         let (side, instant) = (sign_of(sign), path.start.resolution() / path.h);
-        if side == 0.0 || path.rule.jumping_whole[atom] || start.abs() > self.rounding(path, atom, from) {
+        let jumps = path.rule.jumping[atom] || path.rule.jumping_whole[atom];
+        if side == 0.0 || jumps || start.abs() > self.rounding(path, atom, from) {
             return None;
         }
         let mut width = (root - from).max(instant);

@@ -217,7 +217,14 @@ impl Equations<'_> {
                 state = end;
                 continue;
             }
+            let shape = |equations: &mut Self, watched: &Watched, departures: usize| {
+                equations.shape((watched, which), least.1 * step.h, &least.2, (reach, departures))
+            };
             if !is_narrow {
+                // Among solutions that cannot be told apart all is rounding, however short the stretch is.
+                if shape(self, watched, CLOSE - 1) == Shape::Even {
+                    return Some(Meeting { component, position: least.1, reach: last });
+                }
                 let middle = 0.5 * (lo + hi);
                 pieces.extend([(middle, hi), (lo, middle)]);
                 continue;
@@ -231,8 +238,7 @@ impl Equations<'_> {
             let passes = before * after < 0.0;
             // Steps become short where solutions are close, and then the determinant is small everywhere; but so near, there is no other one else.
             let is_near = passes || !is_solved || least.0 <= TOUCH * size;
-            let departures = if is_near { DEPARTURES.len() } else { CLOSE };
-            let shape = self.shape((watched, which), least.1 * step.h, &least.2, (reach, departures));
+            let shape = shape(self, watched, if is_near { DEPARTURES.len() } else { CLOSE });
             if shape == Shape::Even || passes && shape == Shape::Odd {
                 return Some(Meeting { component, position: least.1, reach: last });
             }

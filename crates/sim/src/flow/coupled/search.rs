@@ -54,6 +54,9 @@ impl Solver<'_> {
             residuals[0]
         };
         let first = at(self, start);
+        if !first.is_finite() {
+            return false;
+        }
         let mut inner = [(start, first); 2];
         let mut distance = FIRST * start.abs().max(1.0);
         for _ in 0..DISTANCES {
