@@ -28,7 +28,7 @@ struct Pages {
 /// A scene, or a string to be drawn again.
 enum Content {
     Scene(Box<Scene>),
-    String(ModuleString),
+    String(Box<ModuleString>),
 }
 
 struct Kept {
@@ -58,7 +58,7 @@ impl Album {
         let (content, scene) = if !scene.lacked_accuracy && put(scene.footprint()) {
             (Content::Scene(Box::new(scene)), None)
         } else if put(string.footprint()) {
-            (Content::String(string), Some(scene))
+            (Content::String(Box::new(string)), Some(scene))
         } else {
             return Some(scene);
         };
