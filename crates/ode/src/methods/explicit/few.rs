@@ -19,8 +19,8 @@ fn weighed<W: Weights, const N: usize>(k: &Few) -> [f64; N] {
     let mut sums = [0.0; N];
     for (stage, weight) in W::WEIGHTS.iter().enumerate() {
         if *weight != 0.0 {
-            for j in 0..N {
-                sums[j] += weight * k[stage].0[j];
+            for (sum, k) in sums.iter_mut().zip(&k[stage].0) {
+                *sum += weight * k;
             }
         }
     }
