@@ -119,7 +119,7 @@ impl CrossingDetector {
         if side == 0.0 || jumps || start.abs() > self.rounding(path, atom, from) {
             return None;
         }
-        let mut width = (root - from).max(instant);
+        let mut width = instant;
         loop {
             let to = (from + width).min(limit);
             let value = self.difference(path, atom).value(to);
