@@ -147,34 +147,41 @@ impl KnownSteps {
     }
 }
 
+/// How a module goes on.
+pub(super) enum Followed {
+    /// By the step of one that stood like it.
+    Alike,
+    /// By a step of its own, which may be worth being kept.
+    Alone { is_kept: bool },
+}
+
 impl FlowStage<'_, '_> {
-    /// Makes the step of a module that stood like this one, with what was found in it, its own. If there is none, says whether its step is
-    /// worth being kept: `Err(true)`.
+    /// Makes the step of a module that stood like this one, with what was found in it, its own, if there is one.
     pub(super) fn follow_alike(
         &mut self,
         id: ModuleId,
         from: SimTime,
         experience: &Experience,
-    ) -> Result<Result<(), Error>, bool> {
+    ) -> Result<Followed, Error> {
         if !self.stand(id, from, experience) {
-            return Err(false);
+            return Ok(Followed::Alone { is_kept: false });
         }
-        let Some(known) = self.flows.known_steps.get() else { return Err(true) };
+        let Some(known) = self.flows.known_steps.get() else {
+            return Ok(Followed::Alone { is_kept: true });
+        };
         self.flows.known_steps.note_hit(&known);
         // Steps of one standing at one instant are the same to the last bit.
         let start = known.made.dense.start;
         let moved = |time: SimTime| if from == start { time } else { from.after(time.since(start)) };
         let mut made = known.made.clone();
         (made.dense.start, made.dense.end) = (from, moved(made.dense.end));
-        if let Err(error) = self.take_step(id, from, made) {
-            return Ok(Err(error));
-        }
+        self.take_step(id, from, made)?;
         let state = self.world.state_mut(id).expect("has a step");
         let (near, index) = (state.next.near(), state.rule.get());
         state.next = known.next.moved(moved);
         self.schedule.schedule(Owner::Module(id.slot() as u32), moved(known.at));
         self.detector.note_approach(index.unwrap_or(0), known.next.near(), near, moved(known.at));
-        Ok(Ok(()))
+        Ok(Followed::Alike)
     }
 
     /// Keeps the step that a module has made since [`follow_alike`](Self::follow_alike) asked for it, and that goes on at an instant.

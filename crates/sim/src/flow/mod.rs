@@ -31,7 +31,7 @@ use crate::world::neighbours::Neighbours;
 use crate::world::path::Path;
 use crate::world::state::{Change, Next, NextKind};
 use crate::world::{Instant, World};
-use alike::KnownSteps;
+use alike::{Followed, KnownSteps};
 use coupled::Coupled;
 use dlsys_model::{Model, Sign};
 use dlsys_ode::Dense;
@@ -211,9 +211,9 @@ impl FlowStage<'_, '_> {
         state.next = state.next.again();
         let searched = !numeric && needs_search(state, rule);
         let experience = numeric.then(|| self.experience(id));
-        let is_kept = match experience.map(|own| self.follow_alike(id, from, &own)) {
-            Some(Ok(followed)) => return followed,
-            Some(Err(is_kept)) => is_kept,
+        let is_kept = match experience.map(|own| self.follow_alike(id, from, &own)).transpose()? {
+            Some(Followed::Alike) => return Ok(()),
+            Some(Followed::Alone { is_kept }) => is_kept,
             None => false,
         };
         let (h, limit) = if let Some(experience) = experience {
