@@ -138,3 +138,19 @@ proptest! {
         prop_assert_eq!(count, 2.0, "{}", text);
     }
 }
+
+/// `x` is -0.613 + 0.823 sin(3.558 t): four times through a window of a thousandth, which counts in and out.
+#[test]
+fn a_window_of_a_neighbour_is_not_passed_over_when_its_first_edge_is_left() {
+    for method in METHODS {
+        for window in ["(x + 0.575)*(x + 0.576)", "abs(x + 0.5755) - 0.0005"] {
+            let text = format!(
+                "axiom: P(-0.613) A(0, 0)\nP(x): solve dx/dt = 2.927*cos(3.558*t)\nP(x) < A(n, s):\n\
+                 if {window} < 0 & s = 0 produce A(n + 1, 1)\nif {window} > 0 & s = 1 produce A(n + 1, 0)\n"
+            );
+            let strings = run(&text, Settings { method, ..Settings::default() }, &[3.0]);
+            let string = strings.unwrap_or_else(|error| panic!("{method:?}: {error:?}\n{text}")).remove(0);
+            assert_eq!(string[1].1, [8.0, 0.0], "{method:?}\n{text}");
+        }
+    }
+}
