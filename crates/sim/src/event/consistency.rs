@@ -143,17 +143,24 @@ impl EventStage<'_, '_> {
         let Solved { places, before, values } = solved;
         let mut changed = Changed::default();
         let error = JUMP * self.setup.settings.tolerance;
+        let replaced = &mut self.events.replaced_values;
+        replaced.sort_unstable_by(f64::total_cmp);
+        replaced.dedup();
+        let replaced = &*replaced;
+        // A successor has the value that was followed up to the instant, which may have met a level, and not one that differs from it by an error.
+        let followed = |value: f64| {
+            let next = replaced.partition_point(|other| *other < value);
+            let around = &replaced[next.saturating_sub(1)..(next + 1).min(replaced.len())];
+            let nearest =
+                around.iter().copied().min_by(|a, b| (value - a).abs().total_cmp(&(value - b).abs()));
+            nearest.filter(|other| (value - other).abs() <= error * value.abs().max(1.0)).unwrap_or(value)
+        };
         for ((of, &before), &value) in places.iter().zip(before).zip(values) {
             let (id, _) = of.owner(&self.world.tree);
             let state = self.world.state(id).expect("wanted");
             let in_question = self.events.ready.contains(&id) && state.open.is_none();
             let elsewhere = in_question || state.open.as_ref().is_some_and(|open| open.flow.is_none());
-            // A successor has the value that was followed up to the instant, which may have met a level, and not one that differs from it by an error.
-            let is_close = |other: &f64| (value - other).abs() <= error * value.abs().max(1.0);
-            let followed =
-                self.events.replaced_values.iter().copied().filter(|other| elsewhere && is_close(other));
-            let value =
-                followed.min_by(|a, b| (value - a).abs().total_cmp(&(value - b).abs())).unwrap_or(value);
+            let value = if elsewhere { followed(value) } else { value };
             let size = value.abs().max(before.abs()).max(1.0);
             let step = (value - before).abs();
             let jumps = step > error * size;
