@@ -413,8 +413,8 @@ impl ModelRun {
         if let Some((widest, extent)) = survey.too_wide() {
             let width = brief(widest.width, 4);
             let scale = brief(extent / (20.0 * widest.width), 1);
-            let warning = Diagnostic::warning("a stem is wider than half of all that is drawn is long")
-                .at(widest.span, format!("{width} wide at t = {}, and all is {} long", brief(widest.time, 6), brief(extent, 4)))
+            let warning = Diagnostic::warning("a stem is wider than half of the largest side of the drawing")
+                .at(widest.span, format!("{width} wide at t = {}, and the largest side is {}", brief(widest.time, 6), brief(extent, 4)))
                 .help(format!(
                     "widths are lengths in scene units, as those of `F`; in cpfg they are pixels: scale them, such as `!({scale}*w)`"
                 ));

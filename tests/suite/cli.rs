@@ -116,9 +116,9 @@ fn a_stem_that_is_wider_than_the_drawing_is_long_is_reported() {
         text(&done.stderr)
     };
     let said = warned("A(1, 10)");
-    assert!(said.contains("warning: a stem is wider than half of all that is drawn is long"), "{said}");
+    assert!(said.contains("warning: a stem is wider than half of the largest side of the drawing"), "{said}");
     assert!(said.contains("tree.dls:2:13\n") && said.contains("| "), "{said}");
-    assert!(said.contains("10 wide at t = 5, and all is ") && said.contains("*w)`"), "{said}");
+    assert!(said.contains("10 wide at t = 5, and the largest side is 4") && said.contains("*w)`"), "{said}");
     assert!(!warned("A(1, 0.1)").contains("wider than half"));
     // A body of one piece is as wide as it is meant to be.
     std::fs::write(path("ball.dls"), "initial string: !(1) F(1)").expect("written");
