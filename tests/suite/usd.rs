@@ -22,6 +22,23 @@ fn positions_are_within_the_accuracy_between_frames_too() {
     });
 }
 
+/// Its size and its shape are animated apart, and readers multiply what is linear by what is linear.
+#[test]
+fn an_organ_that_grows_from_nothing_keeps_its_width_between_the_samples_too() {
+    for drawing in
+        ["!(0.2) F(x) @L(x)", "!(0.2) F(x)", "{ F(x) +(90) F(0.3) +(100) F(x*x) }", "!(0.1*x) F(1) @O(0.5)"]
+    {
+        let text = format!("initial string: B(0.0001)\nB(x): solve dx/dt = 1\ninterpret B(x): {drawing}");
+        let session = Session::from_text("wide.dls", &text, &[]).expect("a model");
+        let followed = follow(session, [0.0, 3.0, 0.1], 1);
+        let usd = Usd::read(&self::text(&followed));
+        let times: Vec<f64> = (1..60).map(|i| 0.05 * f64::from(i) * 0.997).collect();
+        let worst = worst_of(&followed, |seconds| usd.shown(seconds), &times, 0.0);
+        let allowed = followed.options.accuracy * followed.options.extent;
+        assert!(worst <= allowed, "{drawing}: {worst} of {allowed}");
+    }
+}
+
 #[test]
 fn units_are_metres_and_seconds_and_names_are_identifiers() {
     let text_of = "title \"a 'reed' \u{1f33e} \\\\ é\"\nunits length 0.5, time 4\ninitial string: F(2) +(90) é-1(1)\nF(x): solve dx/dt = 1";

@@ -7,13 +7,16 @@ use dlsys_geometry::scene::{MaterialId, Vector};
 
 use crate::life::{Life, Shape};
 use crate::mesh::{Cutter, Places};
-use crate::part::{distance, reach};
+use crate::part::{self, distance, reach};
 use crate::stem::{Corner, IS_LENGTH, SIZES};
 use crate::thin::thin;
 use crate::track::Phase;
 
 /// Largest difference of a component of a normal from that between samples.
 const SAME_NORMAL: f32 = 0.08;
+
+/// So many times a stretch of time is cut into halves at most; each makes what is wrong there four times smaller.
+const MOST_HALVINGS: usize = 12;
 
 /// Values at ages, in units of the model; a single value has no age.
 pub(super) struct Samples<T> {
@@ -69,27 +72,75 @@ pub(super) fn form(life: &Life, phase: &Phase, cutter: &Cutter<'_>, tolerance: T
     }
 }
 
-fn changing(life: &Life, phase: &Phase, cutter: &Cutter<'_>, tolerance: Tolerance) -> Form {
-    let ages: Vec<f64> = (0..phase.times.len()).map(|i| phase.age(i)).collect();
-    let sizes: Vec<f64> = (0..ages.len()).map(|i| reach(&life.form, phase.numbers(i))).collect();
-    let largest = sizes.iter().copied().fold(0.0, f64::max);
-    let part = |i: usize| if largest > 0.0 { sizes[i] / largest } else { 1.0 };
-    let mut shapes: Vec<Vec<f32>> = Vec::with_capacity(ages.len());
-    // Without a size there is no shape either: that of the next age.
-    for i in (0..ages.len()).rev() {
-        let numbers = phase.numbers(i);
-        shapes.push(match (part(i) > 1e-6, shapes.last()) {
-            (false, Some(next)) => next.clone(),
-            (false, None) => numbers.to_vec(),
-            (true, _) => numbers.iter().map(|x| (f64::from(*x) / part(i)) as f32).collect(),
-        });
+/// A changing drawing at ages between which size and shape may be taken as linear.
+struct Drawings {
+    ages: Vec<f64>,
+    /// A bound of the distance of all corners from the origin, and the largest of them.
+    sizes: Vec<f64>,
+    largest: f64,
+    /// The numbers as if the organ always had its largest size.
+    shapes: Vec<Vec<f32>>,
+}
+
+impl Drawings {
+    /// The drawings of a phase. Between its samples it moves linearly, and the product of a size and a shape that are linear does not: so
+    /// there are as many ages in between as it takes to come half as near as is tolerated.
+    fn new(phase: &Phase, form: &part::Form, tolerance: f64) -> Drawings {
+        let mut ages: Vec<f64> = (0..phase.times.len()).map(|i| phase.age(i)).collect();
+        let mut numbers: Vec<Vec<f32>> = (0..ages.len()).map(|i| phase.numbers(i).to_vec()).collect();
+        for _ in 0..MOST_HALVINGS {
+            let drawings = Drawings::of(form, &ages, &numbers);
+            let is_bent = |i: &usize| drawings.bend(form, *i) > 0.5 * tolerance;
+            let bent: Vec<usize> = (0..ages.len().saturating_sub(1)).filter(is_bent).collect();
+            if bent.is_empty() {
+                return drawings;
+            }
+            for i in bent.into_iter().rev() {
+                let half = numbers[i].iter().zip(&numbers[i + 1]).map(|(a, b)| a + 0.5 * (b - a)).collect();
+                ages.insert(i + 1, ages[i] + 0.5 * (ages[i + 1] - ages[i]));
+                numbers.insert(i + 1, half);
+            }
+        }
+        Drawings::of(form, &ages, &numbers)
     }
-    shapes.reverse();
+
+    fn of(form: &part::Form, ages: &[f64], numbers: &[Vec<f32>]) -> Drawings {
+        let sizes: Vec<f64> = numbers.iter().map(|own| reach(form, own)).collect();
+        let largest = sizes.iter().copied().fold(0.0, f64::max);
+        let mut drawings = Drawings { ages: ages.to_vec(), sizes, largest, shapes: Vec::new() };
+        // Without a size there is no shape either: that of the next age.
+        for (i, own) in numbers.iter().enumerate().rev() {
+            let part = drawings.part(i);
+            drawings.shapes.push(match (part > 1e-6, drawings.shapes.last()) {
+                (false, Some(next)) => next.clone(),
+                (false, None) => own.clone(),
+                (true, _) => own.iter().map(|x| (f64::from(*x) / part) as f32).collect(),
+            });
+        }
+        drawings.shapes.reverse();
+        drawings
+    }
+
+    /// The size as a part of the largest.
+    fn part(&self, i: usize) -> f64 {
+        if self.largest > 0.0 { self.sizes[i] / self.largest } else { 1.0 }
+    }
+
+    /// How far corners are, half way to the next age, from the middle between where they are at both.
+    fn bend(&self, form: &part::Form, i: usize) -> f64 {
+        let (here, next) = (&self.shapes[i], &self.shapes[i + 1]);
+        0.25 * (self.part(i + 1) - self.part(i)).abs() * distance(form, [here, next], 0.0, next)
+    }
+}
+
+fn changing(life: &Life, phase: &Phase, cutter: &Cutter<'_>, tolerance: Tolerance) -> Form {
+    let drawings = Drawings::new(phase, &life.form, tolerance.shape);
+    let Drawings { ages, sizes, largest, shapes } = &drawings;
     let between = |i: usize, j: usize, k: usize| (ages[k] - ages[i]) / (ages[j] - ages[i]);
     let kept = thin(ages.len(), |i, j| {
         (i + 1..j).all(|k| {
             let off = distance(&life.form, [&shapes[i], &shapes[j]], between(i, j, k), &shapes[k]);
-            off * part(k) <= tolerance.shape
+            off * drawings.part(k) <= tolerance.shape
         })
     });
     let keys: Vec<f64> = kept.iter().map(|&i| ages[i]).collect();
@@ -102,7 +153,8 @@ fn changing(life: &Life, phase: &Phase, cutter: &Cutter<'_>, tolerance: Toleranc
     });
     let is_growing = sizes.iter().any(|size| largest - size > tolerance.size);
     let size = is_growing.then(|| {
-        Samples::at(of_size.iter().map(|&i| ages[i]).collect(), of_size.iter().map(|&i| part(i)).collect())
+        let parts = of_size.iter().map(|&i| drawings.part(i)).collect();
+        Samples::at(of_size.iter().map(|&i| ages[i]).collect(), parts)
     });
     Form { primitives: primitives(life, cutter, &keys, &shapes), size }
 }
