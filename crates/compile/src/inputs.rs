@@ -219,6 +219,16 @@ pub(super) fn check(model: &Model, inputs: &Inputs, diagnostics: &mut Vec<Diagno
                 .help("declare a material, as in `tissue wood = stiffness 1e9, density 800, damping 0.05`, and put `@E(wood)` before the stems that give way"),
         );
     }
+    let blows = model.scenery.wind.is_some() || !model.scenery.flows.is_empty();
+    if let (Some((_, span)), Some((_, solid)), true) = (strain, model.scenery.solids.first(), blows) {
+        diagnostics.push(
+            Diagnostic::error("rules read `strain`, and bodies push the wind")
+                .at(span, "how a stem bends in the wind")
+                .at(*solid, "what the wind is pushed by")
+                .help("growth would follow the wind, and the wind its bodies, at one and the same time: leave out `solid`, or let the rules do without `strain`"),
+        );
+        return;
+    }
     let Some((quantity, span)) = force else { return };
     let name = quantity.name();
     if !inputs.has_sheet && model.scenery.bed.is_none() {

@@ -40,8 +40,8 @@ pub enum Trajectory {
     Coupled(u32),
 }
 
-/// A value of less than this part of that at the start is not computed as a displacement.
-const LITTLE: f64 = 1e-6;
+/// A value of less than this part of that at the start is not computed as a displacement, which would be right to the digits of the start.
+const LITTLE: f64 = 1e-2;
 
 impl Trajectory {
     /// The value at a time since the start, at which it was `x`; NaN for dense output.
