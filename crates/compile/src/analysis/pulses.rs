@@ -61,8 +61,7 @@ pub fn find(
         contexts.push(context_paces(rule, &of_kinds));
         // Without aggregates nothing else matters.
         let is_alone = |index: usize| rules[index].children.is_empty();
-        let is_same =
-            |like: &usize| is_alone(index) && is_alone(*like) && contexts[*like] == contexts[index];
+        let is_same = |like: &usize| is_alone(index) && is_alone(*like) && contexts[*like] == contexts[index];
         if let Some(like) = alike[index].filter(is_same) {
             pulses.push(pulses[like].clone());
             continue;
