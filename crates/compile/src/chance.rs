@@ -209,6 +209,9 @@ impl Clocks {
         let mut clocks = Clocks::default();
         for (item, _) in &document.items {
             let Item::Rule(rule) = item else { continue };
+            if rule.clauses.iter().all(|clause| clause.hazard.is_none()) {
+                continue;
+            }
             let arity = rule.predecessor.parameters.len();
             let name = &rule.predecessor.name.text;
             let hazards = production_keys(rule).filter(|(clause, _)| clause.hazard.is_some());
@@ -222,11 +225,17 @@ impl Clocks {
 
     /// Number of hidden parameters of a kind.
     pub fn width(&self, name: &str, arity: usize) -> usize {
+        if self.widths.is_empty() {
+            return 0;
+        }
         self.widths.get(&(group(name).into_owned(), arity)).copied().unwrap_or(0)
     }
 
     /// The keys of the hidden parameters of a kind; 0 for those that it does not use.
     fn of(&self, name: &str, arity: usize) -> Vec<u64> {
+        if self.keys.is_empty() {
+            return Vec::new();
+        }
         let mut keys = self.keys.get(&(Arc::from(&*sort(name)), arity)).cloned().unwrap_or_default();
         keys.resize(self.width(name, arity), 0);
         keys

@@ -4,6 +4,8 @@ use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
+use rustc_hash::FxHashMap;
+
 use crate::analysis::never_reached;
 use crate::chance::{Hazard, production_keys};
 use crate::conditions::Atoms;
@@ -34,7 +36,7 @@ type Flow = (Vec<(usize, NodeId)>, [usize; 3]);
 /// By flow and by the two sides of an atom: true if the flow cannot make them equal. Rules that differ in names only have the same
 /// expressions.
 #[derive(Default)]
-pub struct OutOfReach(HashMap<Flow, HashMap<(NodeId, NodeId), bool>>);
+pub struct OutOfReach(FxHashMap<Flow, FxHashMap<(NodeId, NodeId), bool>>);
 
 /// The condition of a clause.
 #[derive(Default)]

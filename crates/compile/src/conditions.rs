@@ -1,7 +1,8 @@
 //! Decomposition of conditions into comparisons of two sides (atoms), which all clauses of a rule share.
 
-use std::collections::HashMap;
 use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
 
 use crate::advice;
 use crate::comparisons::{self, Moves};
@@ -41,7 +42,7 @@ pub struct Atoms {
     /// What is decomposed is the condition of a production. Productions take place behind a jump, and equations change at it, so a comparison of what
     /// jumps that both ask for is two atoms.
     pub of_productions: bool,
-    index: HashMap<(NodeId, NodeId, bool), u32>,
+    index: FxHashMap<(NodeId, NodeId, bool), u32>,
 }
 
 impl RuleBuilder<'_> {

@@ -1,6 +1,8 @@
 //! Resolution of the names in contexts, aggregates, `ignore` and `consider` to kinds of modules.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
+
+use rustc_hash::FxHashMap;
 
 use crate::advice;
 use crate::declared::{DeclaredPattern, DeclaredRule, ResolvedRule};
@@ -11,13 +13,13 @@ use dlsys_syntax::ast;
 
 /// Kinds by the names that patterns can use for them.
 struct ByName<'k> {
-    exact: HashMap<&'k str, Vec<KindId>>,
-    base: HashMap<&'k str, Vec<KindId>>,
+    exact: FxHashMap<&'k str, Vec<KindId>>,
+    base: FxHashMap<&'k str, Vec<KindId>>,
 }
 
 impl<'k> ByName<'k> {
     fn new(kinds: &'k Kinds) -> ByName<'k> {
-        let mut index = ByName { exact: HashMap::new(), base: HashMap::new() };
+        let mut index = ByName { exact: FxHashMap::default(), base: FxHashMap::default() };
         for (id, kind) in kinds.iter() {
             index.exact.entry(&kind.name).or_default().push(id);
             index.base.entry(kind.base()).or_default().push(id);

@@ -74,6 +74,9 @@ impl Inputs {
 
     /// The quantities in the hidden parameters of a kind.
     pub fn of(&self, name: &str, arity: usize) -> Vec<Input> {
+        if self.groups.is_empty() {
+            return Vec::new();
+        }
         let Some(all) = self.groups.get(&(group(name).into_owned(), arity)) else { return Vec::new() };
         let read = self.readers.get(&(sort(name).into_owned(), arity));
         let input = |&quantity: &Quantity| {

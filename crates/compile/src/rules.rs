@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use rustc_hash::FxHashMap;
+
 use crate::advice;
 use crate::chance::Clocks;
 use crate::clauses::{MovingParameters, OutOfReach, moving_parameters};
@@ -92,8 +94,7 @@ impl<'b> RuleBuilder<'b> {
         right: &[HeadModule],
         aggregates: u32,
     ) -> (Variables, usize) {
-        let mut names: HashMap<Arc<str>, NodeId> = HashMap::new();
-        let mut spans: HashMap<Arc<str>, Span> = HashMap::new();
+        let mut names: FxHashMap<Arc<str>, NodeId> = FxHashMap::default();
         let mut count = 0;
         let mut parameters = Vec::new();
         for module in std::iter::once(own).chain(left).chain(right) {
@@ -102,7 +103,7 @@ impl<'b> RuleBuilder<'b> {
             let hidden = self.hidden(module);
             count += (module.parameters.len() + hidden) as u32;
         }
-        for (parameter, number) in parameters {
+        for (i, &(parameter, number)) in parameters.iter().enumerate() {
             let node = self.scope.graph.var(number);
             if RESERVED.contains(&&*parameter.text) {
                 self.error(
@@ -114,7 +115,9 @@ impl<'b> RuleBuilder<'b> {
                         }),
                 );
             }
-            if let Some(before) = spans.insert(parameter.text.clone(), parameter.span) {
+            if names.insert(parameter.text.clone(), node).is_some() {
+                let before = parameters[..i].iter().rfind(|(known, _)| known.text == parameter.text);
+                let before = before.expect("only parameters are in the map").0.span;
                 self.error(
                     Diagnostic::error(format!("two parameters of this head are called `{}`", parameter.text))
                         .at(parameter.span, "the second one")
@@ -122,7 +125,6 @@ impl<'b> RuleBuilder<'b> {
                         .help(advice::other_name(&parameter.text, !left.is_empty(), !right.is_empty())),
                 );
             }
-            names.insert(parameter.text.clone(), node);
         }
         let first_aggregate = count;
         count += aggregates;

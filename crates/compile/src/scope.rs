@@ -4,6 +4,8 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::Arc;
 
+use rustc_hash::FxHashMap;
+
 use crate::advice;
 use crate::air::{self, Air};
 use crate::call::Call;
@@ -49,7 +51,7 @@ pub(super) struct Function {
 /// The names that an expression can use in addition to the global ones.
 #[derive(Clone, Default)]
 pub struct Variables {
-    pub names: HashMap<Arc<str>, NodeId>,
+    pub names: FxHashMap<Arc<str>, NodeId>,
     /// Help for `t` or `age` in an expression without them; None if they are in `names`.
     pub no_time: Option<&'static str>,
     /// Names and places of all `let` lines of the rule, including those not yet lowered.

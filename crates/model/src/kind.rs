@@ -211,7 +211,8 @@ pub fn base_of(name: &str) -> &str {
 #[derive(Clone, Debug)]
 pub struct Kinds {
     all: Vec<Kind>,
-    ids: HashMap<(String, usize), KindId>,
+    /// By name: the kinds with each number of parameters.
+    ids: HashMap<String, Vec<(usize, KindId)>>,
 }
 
 impl Default for Kinds {
@@ -240,13 +241,13 @@ impl Kinds {
             clocks: Vec::new(),
             inputs: Vec::new(),
         });
-        self.ids.insert((name.to_owned(), arity), id);
+        self.ids.entry(name.to_owned()).or_default().push((arity, id));
         id
     }
 
     /// The kind with this name and number of parameters, if the model mentions it.
     pub fn find(&self, name: &str, arity: usize) -> Option<KindId> {
-        self.ids.get(&(name.to_owned(), arity)).copied()
+        self.ids.get(name)?.iter().find(|(known, _)| *known == arity).map(|(_, id)| *id)
     }
 
     /// A kind by its number, which must come from this table.

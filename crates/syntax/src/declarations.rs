@@ -7,6 +7,8 @@
 
 mod traits;
 
+use std::sync::LazyLock;
+
 use crate::grammar::Rule;
 pub(crate) use traits::Begins;
 pub use traits::{Body, Category, Follow, Named, OptionWord, Repeats};
@@ -508,6 +510,15 @@ impl Declaration {
 /// All options of all declarations; a word is listed once for each declaration that has it.
 pub fn options() -> impl Iterator<Item = &'static OptionWord> {
     DECLARATIONS.iter().flat_map(|declaration| declaration.options)
+}
+
+/// True if a value follows an option wherever it is a word of the language, also outside of its declaration.
+pub fn is_before_value_everywhere(word: &str) -> bool {
+    static WORDS: LazyLock<Vec<&str>> = LazyLock::new(|| {
+        let everywhere = options().filter(|option| option.follow == Follow::ValueEverywhere);
+        everywhere.map(|option| option.word).collect()
+    });
+    WORDS.contains(&word)
 }
 
 /// The words that begin a declaration.

@@ -26,7 +26,7 @@ mod stepping;
 mod variability;
 mod zeros;
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use dlsys_expr::{Graph, NodeId, Program};
 use dlsys_model::{Aggregate, Jacobian, Kinds, Pulses, Rule, ZeroCrossing};
@@ -60,23 +60,25 @@ pub fn analyse(graph: &mut Graph, kinds: &Kinds, rules: Vec<ResolvedRule>) -> An
         kind.rules.iter().for_each(|rule| kinds_of[*rule].push(id.index()));
     }
     let mut found: Vec<RuleAnalysis> = Vec::with_capacity(rules.len());
-    let mut known: HashMap<Shape, usize> = HashMap::new();
+    let mut alike: Vec<Option<usize>> = Vec::with_capacity(rules.len());
+    let mut known: FxHashMap<Shape, usize> = FxHashMap::default();
     for (i, rule) in rules.iter().enumerate() {
         let shape = Shape::of(rule, moving.context(i));
-        let like = shape.as_ref().and_then(|shape| known.get(shape));
+        let like = shape.as_ref().and_then(|shape| known.get(shape).copied());
         let analysis = match like {
-            Some(like) => found[*like].clone(),
+            Some(like) => found[like].clone(),
             None => {
                 let is_needed = |p: usize| kinds_of[i].iter().any(|kind| needed.contains(&(*kind, p)));
                 analyse_rule(graph, rule, moving.context(i), &is_needed)
             }
         };
         found.push(analysis);
+        alike.push(like);
         if let Some(shape) = shape {
             known.entry(shape).or_insert(i);
         }
     }
-    let pulses = pulses::find(graph, kinds, &rules, &found, &moving);
+    let pulses = pulses::find(graph, kinds, &rules, (&found, &alike), &moving);
     let drawn_only = need::drawn_only(graph, kinds, &rules);
     let parts = rules.into_iter().zip(found).zip(aggregates).zip(pulses).enumerate();
     let rules = parts

@@ -1,6 +1,6 @@
 //! The parameters that rates, conditions and productions read; others need no computation until they are observed.
 
-use std::collections::HashSet;
+use rustc_hash::FxHashSet;
 
 use dlsys_expr::{Graph, NodeId};
 use dlsys_model::Kinds;
@@ -8,7 +8,7 @@ use dlsys_model::Kinds;
 use crate::declared::ResolvedRule;
 
 /// Parameters as pairs of the index of a kind and that of the parameter.
-type ParameterSet = HashSet<(usize, usize)>;
+type ParameterSet = FxHashSet<(usize, usize)>;
 
 /// The parameters for which the variables of rules stand.
 struct Owners<'r> {
@@ -72,7 +72,7 @@ fn reads(graph: &Graph, nodes: &[NodeId]) -> Vec<usize> {
 /// The parameters that rates and conditions read, directly or through algebraic parameters.
 pub fn needed(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> ParameterSet {
     let owners = Owners::new(graph, kinds, rules);
-    let mut read = ParameterSet::new();
+    let mut read = ParameterSet::default();
     for (index, ResolvedRule { declared, .. }) in rules.iter().enumerate() {
         // An implicit parameter is solved for in each step: occasional solves might converge to another solution.
         for entry in declared.algebraic().filter(|entry| !entry.explicit) {
@@ -104,7 +104,7 @@ pub fn needed(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> Parameter
 /// By kind and parameter: true if only drawings read it.
 pub fn drawn_only(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> Vec<Vec<bool>> {
     let owners = Owners::new(graph, kinds, rules);
-    let mut read = ParameterSet::new();
+    let mut read = ParameterSet::default();
     for (index, ResolvedRule { declared, .. }) in rules.iter().enumerate() {
         let sides: Vec<NodeId> = declared.side_nodes().collect();
         let mut variables = reads(graph, &sides);

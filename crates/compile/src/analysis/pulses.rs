@@ -31,20 +31,22 @@ enum Pace {
 /// The parameters of a clause that follow formulas other than polynomials, with their variation.
 type Paces = Vec<(usize, Pace)>;
 
-/// By rule and clause: the terms that may have pulses.
+/// By rule and clause: the terms that may have pulses. `alike` has, by rule, one before with the same expressions, if there is one.
 pub fn find(
     graph: &mut Graph,
     kinds: &Kinds,
     rules: &[ResolvedRule],
-    found: &[RuleAnalysis],
+    (found, alike): (&[RuleAnalysis], &[Option<usize>]),
     moving: &Moving,
 ) -> Vec<Vec<Pulses>> {
-    let clauses: Vec<Vec<Paces>> = (rules.iter().zip(found))
-        .map(|(rule, found)| {
-            let solves = rule.declared.solves.iter().zip(&found.clauses);
-            solves.map(|(solve, clause)| paces(graph, solve, &clause.solution_forms)).collect()
-        })
-        .collect();
+    let mut clauses: Vec<Vec<Paces>> = Vec::with_capacity(rules.len());
+    for ((rule, found), like) in rules.iter().zip(found).zip(alike) {
+        let solves = rule.declared.solves.iter().zip(&found.clauses);
+        clauses.push(match like {
+            Some(like) => clauses[*like].clone(),
+            None => solves.map(|(solve, clause)| paces(graph, solve, &clause.solution_forms)).collect(),
+        });
+    }
     let mut of_kinds: Vec<Vec<Pace>> =
         kinds.iter().map(|(_, kind)| vec![Pace::default(); kind.width()]).collect();
     for (id, kind) in kinds.iter() {
@@ -53,12 +55,21 @@ pub fn find(
             *known = pace.max(*known);
         }
     }
-    let mut pulses = Vec::with_capacity(rules.len());
+    let mut pulses: Vec<Vec<Pulses>> = Vec::with_capacity(rules.len());
+    let mut contexts: Vec<Vec<Pace>> = Vec::with_capacity(rules.len());
     for (index, (rule, found)) in rules.iter().zip(found).enumerate() {
+        contexts.push(context_paces(rule, &of_kinds));
+        // Without aggregates nothing else matters.
+        let is_alone = |index: usize| rules[index].children.is_empty();
+        let is_same = |like: &usize| is_alone(index) && is_alone(*like) && contexts[*like] == contexts[index];
+        if let Some(like) = alike[index].filter(is_same) {
+            pulses.push(pulses[like].clone());
+            continue;
+        }
         let surroundings = Surroundings {
             rule,
             moving: moving.context(index),
-            context: context_paces(rule, &of_kinds),
+            context: &contexts[index],
             children: (rule.children.iter())
                 .flat_map(|pattern| pattern.kinds.iter().flat_map(|kind| &of_kinds[kind.index()]))
                 .fold(Pace::default(), |most, pace| most.max(*pace)),
@@ -79,7 +90,7 @@ struct Surroundings<'r> {
     /// By variable of the context: true if it changes.
     moving: &'r [bool],
     /// The variation of the context.
-    context: Vec<Pace>,
+    context: &'r [Pace],
     /// The variation of the parameters of children in aggregates.
     children: Pace,
 }

@@ -1,7 +1,7 @@
 //! Keywords that begin a string or an expression, the nesting that they open, and line breaks that end an expression.
 
 use super::{ItemKind, Last, Level, Scanner};
-use crate::declarations::{Begins, Follow, OptionWord, options};
+use crate::declarations::{Begins, Follow, OptionWord, is_before_value_everywhere};
 use crate::lexeme::Token;
 
 impl Scanner<'_> {
@@ -96,9 +96,8 @@ impl Scanner<'_> {
     /// True if a word is an option with a value behind it, so that a line break between the two ends nothing.
     fn goes_on_after(&self, word: &str) -> bool {
         let declaration = self.items.last().and_then(|item| item.kind.declaration());
-        let is = |option: &OptionWord, follow| option.word == word && option.follow == follow;
-        options().any(|option| is(option, Follow::ValueEverywhere))
-            || declaration.is_some_and(|d| d.options.iter().any(|option| is(option, Follow::Value)))
+        let is_own = |option: &OptionWord| option.word == word && option.follow == Follow::Value;
+        is_before_value_everywhere(word) || declaration.is_some_and(|d| d.options.iter().any(is_own))
     }
 
     fn count_if(&mut self, yes: bool) {

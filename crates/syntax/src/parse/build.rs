@@ -1,7 +1,9 @@
 //! From pest's pairs to the syntax tree.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::sync::{Arc, LazyLock};
+
+use rustc_hash::FxHashSet;
 
 use crate::ast;
 use crate::ast::{
@@ -19,7 +21,7 @@ pub(crate) type Built<T> = Result<T, Box<Diagnostic>>;
 
 /// Stores one copy of each name.
 #[derive(Default)]
-pub struct Interner(HashMap<Box<str>, Arc<str>>);
+pub struct Interner(FxHashSet<Arc<str>>);
 
 impl Interner {
     pub(super) fn get(&mut self, text: &str) -> Arc<str> {
@@ -27,7 +29,7 @@ impl Interner {
             return known.clone();
         }
         let new: Arc<str> = text.into();
-        self.0.insert(text.into(), new.clone());
+        self.0.insert(new.clone());
         new
     }
 }

@@ -17,9 +17,9 @@ use dlsys_diagnostic::{Diagnostic, Span};
 fn words(rule: Rule) -> Option<&'static str> {
     use Rule::*;
     Some(match rule {
-        expr | number | literal | ident | call | indexed | array | if_expr | match_expr | neg | not
-        | coefficient => "an expression",
-        or | and | le | ge | ne | lt | gt | eq | add | sub | mul | div | pow => "an operator",
+        expr | number | lone_number | literal | ident | call | indexed | array | if_expr | match_expr
+        | neg | not | coefficient => "an expression",
+        or | and | comparison | sum | product | pow => "an operator",
         module | modules | successor | alternative | name => "a module",
         epsilon => "`ε` for nothing",
         arguments => "`(` and parameters",

@@ -17,14 +17,9 @@ static PRATT: LazyLock<PrattParser<Rule>> = LazyLock::new(|| {
         .op(Op::infix(Rule::or, Assoc::Left))
         .op(Op::infix(Rule::and, Assoc::Left))
         .op(Op::prefix(Rule::not))
-        .op(Op::infix(Rule::lt, Assoc::Left)
-            | Op::infix(Rule::le, Assoc::Left)
-            | Op::infix(Rule::eq, Assoc::Left)
-            | Op::infix(Rule::ne, Assoc::Left)
-            | Op::infix(Rule::ge, Assoc::Left)
-            | Op::infix(Rule::gt, Assoc::Left))
-        .op(Op::infix(Rule::add, Assoc::Left) | Op::infix(Rule::sub, Assoc::Left))
-        .op(Op::infix(Rule::mul, Assoc::Left) | Op::infix(Rule::div, Assoc::Left))
+        .op(Op::infix(Rule::comparison, Assoc::Left))
+        .op(Op::infix(Rule::sum, Assoc::Left))
+        .op(Op::infix(Rule::product, Assoc::Left))
         .op(Op::prefix(Rule::neg))
         // `2x^2` is 2(x^2), `x/2c` is x/(2c): a number binds to the factor that it touches.
         .op(Op::prefix(Rule::coefficient))
@@ -59,14 +54,14 @@ impl Builder<'_> {
                 let (a, b) = (a?, b?);
                 let this = &mut *this.borrow_mut();
                 let span = this.expressions.span(a).to(this.expressions.span(b));
-                let operator = match op.as_rule() {
-                    Rule::add => Operator::Add,
-                    Rule::sub => Operator::Sub,
-                    Rule::mul => Operator::Mul,
-                    Rule::div => Operator::Div,
-                    Rule::pow => Operator::Pow,
-                    Rule::and => Operator::And,
-                    Rule::or => Operator::Or,
+                let operator = match op.as_str().trim_end() {
+                    "+" => Operator::Add,
+                    "-" => Operator::Sub,
+                    "*" | "·" => Operator::Mul,
+                    "/" => Operator::Div,
+                    "^" => Operator::Pow,
+                    "&" => Operator::And,
+                    "|" => Operator::Or,
                     comparison => return Ok(this.compare(a, comparison, b, span)),
                 };
                 Ok(this.expressions.push(Expr::Binary(operator, a, b), span))
@@ -77,13 +72,13 @@ impl Builder<'_> {
     /// A comparison, or one more link of a chain.
     ///
     /// The chain is rebuilt after its last operand, so that operands still precede their users.
-    fn compare(&mut self, a: ExprId, op: Rule, b: ExprId, span: Span) -> ExprId {
-        let comparison = match op {
-            Rule::lt => Comparison::Less,
-            Rule::le => Comparison::LessOrEqual,
-            Rule::eq => Comparison::Equal,
-            Rule::ne => Comparison::NotEqual,
-            Rule::ge => Comparison::GreaterOrEqual,
+    fn compare(&mut self, a: ExprId, sign: &str, b: ExprId, span: Span) -> ExprId {
+        let comparison = match sign {
+            "<" => Comparison::Less,
+            "<=" | "≤" => Comparison::LessOrEqual,
+            "=" => Comparison::Equal,
+            "!=" | "≠" => Comparison::NotEqual,
+            ">=" | "≥" => Comparison::GreaterOrEqual,
             _ => Comparison::Greater,
         };
         let chain = match self.expressions.get_mut(a) {
@@ -117,7 +112,7 @@ impl Builder<'_> {
     fn primary(&mut self, pair: Pair) -> Built<ExprId> {
         let span = self.span(&pair);
         match pair.as_rule() {
-            Rule::number => {
+            Rule::lone_number => {
                 let value = self.number(&pair)?;
                 Ok(self.expressions.push(Expr::Number(value), span))
             }
