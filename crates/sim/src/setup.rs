@@ -1,7 +1,8 @@
 //! The facts of a run that do not change: the model, the settings, and their consequences.
 
 use super::{Method, Settings};
-use dlsys_model::{CUT, KindId, Model, Produce, Rule, ZeroCrossing};
+use dlsys_expr::Program;
+use dlsys_model::{CUT, KindId, Model, Produce, Rule, Solve, Successor, ZeroCrossing};
 use dlsys_tree::Seed;
 use std::collections::BTreeSet;
 
@@ -27,6 +28,10 @@ pub struct Setup<'m> {
     pub successors_read_context: Vec<bool>,
     /// By rule: see [`levels_decide`].
     pub levels_decide: Vec<bool>,
+    /// By rule: see [`has_meetings`].
+    pub has_meetings: Vec<bool>,
+    /// By rule and production: see [`is_delicate`].
+    pub is_delicate: Vec<Vec<bool>>,
     /// By rule and production: something jumps in its condition or its successors.
     pub jumps: Vec<Vec<bool>>,
     /// By rule and production: the variables over which something jumps in its successors.
@@ -80,6 +85,8 @@ impl<'m> Setup<'m> {
             kinds_with_context,
             successors_read_context: successors_read_context.collect(),
             levels_decide: model.rules.iter().map(levels_decide).collect(),
+            has_meetings: model.rules.iter().map(has_meetings).collect(),
+            is_delicate: model.rules.iter().map(|rule| is_delicate(model, rule)).collect(),
             jumps: model.rules.iter().map(jumps).collect(),
             jump_reads: model.rules.iter().map(jump_reads).collect(),
             has_jumps: model.rules.iter().map(has_jumps).collect(),
@@ -115,6 +122,44 @@ pub fn levels_decide(rule: &Rule) -> bool {
     let asks = rule.produces.iter().any(|produce| asks_for_jumps(rule, produce));
     asks || !meets.is_empty()
         && rule.produces.iter().any(|produce| produce.outcome.jump_reads().any(|v| meets.contains(&v)))
+}
+
+/// True if a production depends on sides that meet where no variable that moves by itself alone meets a level: `x + y = 3.4`, or
+/// `v = 3.4` of a value that the module computes from others.
+fn has_meetings(rule: &Rule) -> bool {
+    let is_meeting = |atom: usize, clause: Option<&Solve>, crossing: &ZeroCrossing| match crossing {
+        ZeroCrossing::Search { level: None, .. } => !rule.jumping_whole[atom],
+        ZeroCrossing::Search { level: Some((variable, _)), .. } => {
+            clause.is_some_and(|clause| clause.algebraic.of.contains(variable))
+        }
+        _ => false,
+    };
+    let meets = |atom: usize| {
+        let mut solves = rule.solves.iter();
+        is_meeting(atom, None, &rule.zero_crossings_at_rest[atom])
+            || solves.any(|solve| is_meeting(atom, Some(solve), &solve.zero_crossings[atom]))
+    };
+    (0..rule.atoms.len()).any(|atom| rule.decides_productions(atom) && meets(atom))
+}
+
+/// By production: a rounding of the values at the instant may decide over its successor. Something jumps there, or is not defined on both
+/// sides of a level, or the module has weights or gets equations of that sort.
+fn is_delicate(model: &Model, rule: &Rule) -> Vec<bool> {
+    let is_partial = |program: &Program| !program.partial_reads().is_empty();
+    let has_partial_rates = |kind: KindId| {
+        let rules = model.kinds.get(kind).rules.iter().map(|rule| &model.rules[*rule]);
+        let solves = rules.flat_map(|rule| &rule.solves);
+        solves.flat_map(|solve| [&solve.rates, &solve.algebraic.values]).any(is_partial)
+    };
+    let of = |produce: &Produce| {
+        let outcome = &produce.outcome;
+        let programs = outcome.successors.iter().flat_map(Successor::programs);
+        outcome.weights.is_some()
+            || outcome.jump_reads().next().is_some()
+            || programs.into_iter().any(is_partial)
+            || outcome.successors.iter().flat_map(Successor::kinds).any(has_partial_rates)
+    };
+    rule.produces.iter().map(of).collect()
 }
 
 /// True if the condition of a production compares whole parts or signs.
