@@ -30,6 +30,8 @@ pub struct Setup<'m> {
     pub levels_decide: Vec<bool>,
     /// By rule: see [`has_meetings`].
     pub has_meetings: Vec<bool>,
+    /// By rule: some equation of it is not defined on both sides of a level.
+    pub has_edges: Vec<bool>,
     /// By rule and production: see [`is_delicate`].
     pub is_delicate: Vec<Vec<bool>>,
     /// By rule and production: something jumps in its condition or its successors.
@@ -86,6 +88,7 @@ impl<'m> Setup<'m> {
             successors_read_context: successors_read_context.collect(),
             levels_decide: model.rules.iter().map(levels_decide).collect(),
             has_meetings: model.rules.iter().map(has_meetings).collect(),
+            has_edges: model.rules.iter().map(has_edges).collect(),
             is_delicate: model.rules.iter().map(|rule| is_delicate(model, rule)).collect(),
             jumps: model.rules.iter().map(jumps).collect(),
             jump_reads: model.rules.iter().map(jump_reads).collect(),
@@ -142,22 +145,24 @@ fn has_meetings(rule: &Rule) -> bool {
     (0..rule.atoms.len()).any(|atom| rule.decides_productions(atom) && meets(atom))
 }
 
-/// By production: a rounding of the values at the instant may decide over its successor. Something jumps there, or is not defined on both
-/// sides of a level, or the module has weights or gets equations of that sort.
+/// True if some equation of a rule has a function that ends at an edge, beyond which it is not defined.
+fn has_edges(rule: &Rule) -> bool {
+    let programs = rule.solves.iter().flat_map(|solve| [&solve.rates, &solve.algebraic.values]);
+    programs.into_iter().any(|program| !program.partial_reads().is_empty())
+}
+
+/// By production: a rounding of the values at the instant may decide over its successor. Something jumps there, or ends at an edge, it has
+/// weights, or equations of the new modules end at an edge.
 fn is_delicate(model: &Model, rule: &Rule) -> Vec<bool> {
     let is_partial = |program: &Program| !program.partial_reads().is_empty();
-    let has_partial_rates = |kind: KindId| {
-        let rules = model.kinds.get(kind).rules.iter().map(|rule| &model.rules[*rule]);
-        let solves = rules.flat_map(|rule| &rule.solves);
-        solves.flat_map(|solve| [&solve.rates, &solve.algebraic.values]).any(is_partial)
-    };
+    let leads_to_edges =
+        |kind: KindId| model.kinds.get(kind).rules.iter().any(|rule| has_edges(&model.rules[*rule]));
     let of = |produce: &Produce| {
         let outcome = &produce.outcome;
-        let programs = outcome.successors.iter().flat_map(Successor::programs);
         outcome.weights.is_some()
             || outcome.jump_reads().next().is_some()
-            || programs.into_iter().any(is_partial)
-            || outcome.successors.iter().flat_map(Successor::kinds).any(has_partial_rates)
+            || outcome.successors.iter().flat_map(Successor::programs).any(is_partial)
+            || outcome.successors.iter().flat_map(Successor::kinds).any(leads_to_edges)
     };
     rule.produces.iter().map(of).collect()
 }

@@ -104,6 +104,24 @@ fn nearest(
 }
 
 impl EventStage<'_, '_> {
+    /// Gives a module that goes on, and some equations of which end at an edge (`sqrt(x + y - 3.4)`), values at which the sides that meet now
+    /// are equal: a rounding beyond, they would not be defined.
+    pub(super) fn settle_at_edge(&mut self, id: ModuleId) {
+        let Some(state) = self.world.state(id) else { return };
+        let Some(index) = state.rule.get().filter(|rule| self.setup.has_edges[*rule]) else { return };
+        let Some(open) = state.open.as_ref().filter(|open| !open.levels.is_empty()) else { return };
+        let rule = &self.setup.model.rules[index];
+        let variables = &mut self.scratch.variables;
+        self.world.variables(rule, id, &state.context, self.instant.at, variables);
+        put_levels(&self.events.met, (&self.world.tree, id), &state.context, variables);
+        let error = ERRORS * self.setup.settings.tolerance;
+        Meeting::new(rule, open, state.numeric_only, error).settle(self.scratch, |_| true);
+        let places = self.world.tree.places(id);
+        for (place, &value) in places.zip(&self.scratch.variables) {
+            self.world.tree.set_value(place, value);
+        }
+    }
+
     /// A variable of a module or of its context that moves, and the number at which the sides of an atom are equal; none if there is
     /// none within the rounding of the numbers of now.
     pub fn meeting(&mut self, id: ModuleId, rule: &Rule, atom: usize) -> Option<(usize, f64)> {

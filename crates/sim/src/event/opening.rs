@@ -104,16 +104,18 @@ impl EventStage<'_, '_> {
                 open.levels.push(Level { atom: change.atom(), level, after: change.after });
             }
         }
+        self.settle_at_edge(id);
     }
 
-    /// True if sides meet at the instant on which a production depends, and no variable that alone would do so.
+    /// True if sides meet at the instant, no variable that alone would do so, and a production depends on them or equations that end there.
     fn is_meeting(&self, id: ModuleId, change: &Change) -> bool {
         let rule = self.world.state(id).and_then(|state| state.rule.get());
-        let Some(rule) = rule.filter(|rule| self.setup.has_meetings[*rule]) else { return false };
-        let rule = &self.setup.model.rules[rule];
+        let concerns = |rule: &usize| self.setup.has_meetings[*rule] || self.setup.has_edges[*rule];
+        let Some(index) = rule.filter(concerns) else { return false };
+        let rule = &self.setup.model.rules[index];
         change.at == Sign::Zero
             && !rule.jumping_whole[change.atom()]
-            && rule.decides_productions(change.atom())
+            && (self.setup.has_edges[index] || rule.decides_productions(change.atom()))
     }
 
     /// The same, of a module whose event has been found to take place now.
