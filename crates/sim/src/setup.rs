@@ -30,8 +30,10 @@ pub struct Setup<'m> {
     pub levels_decide: Vec<bool>,
     /// By rule: see [`has_meetings`].
     pub has_meetings: Vec<bool>,
-    /// By rule: some equation of it is not defined on both sides of a level.
+    /// By rule: some equation of it is not defined on both sides of a level, and no comparison jumps: behind a jump values are kept off their levels.
     pub has_edges: Vec<bool>,
+    /// By rule: some production makes modules that have such equations.
+    pub leads_to_edges: Vec<bool>,
     /// By rule and production: see [`is_delicate`].
     pub is_delicate: Vec<Vec<bool>>,
     /// By rule and production: something jumps in its condition or its successors.
@@ -88,7 +90,8 @@ impl<'m> Setup<'m> {
             successors_read_context: successors_read_context.collect(),
             levels_decide: model.rules.iter().map(levels_decide).collect(),
             has_meetings: model.rules.iter().map(has_meetings).collect(),
-            has_edges: model.rules.iter().map(has_edges).collect(),
+            has_edges: model.rules.iter().map(|rule| has_edges(rule) && !has_jumps(rule)).collect(),
+            leads_to_edges: model.rules.iter().map(|rule| leads_to_edges(model, rule)).collect(),
             is_delicate: model.rules.iter().map(|rule| is_delicate(model, rule)).collect(),
             jumps: model.rules.iter().map(jumps).collect(),
             jump_reads: model.rules.iter().map(jump_reads).collect(),
@@ -151,18 +154,31 @@ fn has_edges(rule: &Rule) -> bool {
     programs.into_iter().any(|program| !program.partial_reads().is_empty())
 }
 
+/// True for a kind with such a rule.
+fn is_at_edge(model: &Model, kind: KindId) -> bool {
+    model.kinds.get(kind).rules.iter().any(|rule| has_edges(&model.rules[*rule]))
+}
+
+/// The kinds of the modules that a production makes.
+fn kinds_of(produce: &Produce) -> impl Iterator<Item = KindId> {
+    produce.outcome.successors.iter().flat_map(Successor::kinds)
+}
+
+/// True if some production of a rule makes modules with equations that end at an edge.
+fn leads_to_edges(model: &Model, rule: &Rule) -> bool {
+    rule.produces.iter().flat_map(kinds_of).any(|kind| is_at_edge(model, kind))
+}
+
 /// By production: a rounding of the values at the instant may decide over its successor. Something jumps there, or ends at an edge, it has
 /// weights, or equations of the new modules end at an edge.
 fn is_delicate(model: &Model, rule: &Rule) -> Vec<bool> {
     let is_partial = |program: &Program| !program.partial_reads().is_empty();
-    let leads_to_edges =
-        |kind: KindId| model.kinds.get(kind).rules.iter().any(|rule| has_edges(&model.rules[*rule]));
     let of = |produce: &Produce| {
         let outcome = &produce.outcome;
         outcome.weights.is_some()
             || outcome.jump_reads().next().is_some()
             || outcome.successors.iter().flat_map(Successor::programs).any(is_partial)
-            || outcome.successors.iter().flat_map(Successor::kinds).any(leads_to_edges)
+            || kinds_of(produce).any(|kind| is_at_edge(model, kind))
     };
     rule.produces.iter().map(of).collect()
 }

@@ -10,14 +10,19 @@ use crate::setup::Setup;
 use crate::world::World;
 use crate::world::context::Context;
 use crate::world::new_modules::NewModules;
+use crate::world::state::State;
 use dlsys_model::{Rule, Sign};
 use dlsys_tree::{ModuleId, Tree};
 
 /// A value that is further from a level than this part of it, or of 1, has left it since.
 const LEFT: f64 = 1e-12;
 
-/// Most by which values are corrected so that sides are equal that meet, in tolerances: by so much what is followed may err.
+/// Most by which values are corrected so that sides are equal that meet, in errors of integration as they are estimated,
 const ERRORS: f64 = 10.0;
+
+/// or in tolerances, if that is more: a value of what is integrated errs by a part of one. Where it would take more to bring a value to its level, as
+/// at `x^2 - 4*x + 4.00001 = 0`, the values that it is computed from are known better than that level is met.
+const TOLERANCES: f64 = 0.5;
 
 /// Puts the levels that parameters of a module's context meet at this instant among the variables of its rule; a value that has jumped at the
 /// instant meets none any more.
@@ -42,6 +47,13 @@ pub fn put_levels(
     }
 }
 
+/// Most by which a value that a module reads may be corrected, as a part of its size or of 1.
+fn error_of(setup: &Setup, world: &World, state: &State) -> f64 {
+    let own = state.step.as_ref().map_or(0.0, |step| step.dense.error);
+    let common = world.coupled.as_ref().map_or(0.0, |solution| solution.error);
+    (ERRORS * own.max(common)).max(TOLERANCES * setup.settings.tolerance)
+}
+
 /// Most steps of rounding by which a level is moved, so that the sides that meet there are equal.
 const MOST_ULPS: u32 = 8;
 
@@ -63,7 +75,8 @@ pub fn set_levels(setup: &Setup, world: &World, fire: &Firing, scratch: &mut Scr
     if !is_delicate && !setup.has_meetings[fire.rule] {
         return;
     }
-    let meeting = Meeting::new(rule, open, state.numeric_only, ERRORS * setup.settings.tolerance);
+    let meeting = Meeting::new(rule, open, state.numeric_only, error_of(setup, world, state));
+    let meeting = if setup.leads_to_edges[fire.rule] { meeting.alone() } else { meeting };
     if !is_delicate {
         if meeting.is_integrated() {
             meeting.settle(scratch, |_| true);
@@ -114,7 +127,7 @@ impl EventStage<'_, '_> {
         let variables = &mut self.scratch.variables;
         self.world.variables(rule, id, &state.context, self.instant.at, variables);
         put_levels(&self.events.met, (&self.world.tree, id), &state.context, variables);
-        let error = ERRORS * self.setup.settings.tolerance;
+        let error = error_of(self.setup, self.world, state);
         Meeting::new(rule, open, state.numeric_only, error).settle(self.scratch, |_| true);
         let places = self.world.tree.places(id);
         for (place, &value) in places.zip(&self.scratch.variables) {

@@ -30,6 +30,9 @@ const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// What follows a formula is moved by no more than this part of its size.
 const FORMULA_ERROR: f64 = 1e-12;
 
+/// What is smaller than this part of the largest variable is moved as if it were as large, if it has to be.
+const LEAST_SIZE: f64 = 1e-3;
+
 /// A gradient of which no more than this part is left beside the others follows from them.
 const DEPENDENT: f64 = 1e-6;
 
@@ -48,7 +51,7 @@ pub struct Meeting<'r> {
     /// Own parameters that are integrated or solved for; own ones with formulas; those of the context; all others. The first sort that can
     /// make the sides equal does.
     sorts: [Sort; 4],
-    /// Values that follow from what is integrated, by their places among those of the clause.
+    /// Values that follow from what the module moves, by their places among those of the clause.
     dependent: SmallVec<[usize; 4]>,
     /// Equations `0 = g` of unknowns that the sides read.
     implicit: SmallVec<[usize; 2]>,
@@ -75,7 +78,7 @@ impl<'r> Meeting<'r> {
                     implicit.extend(read(parameter).then_some(place));
                 } else if !algebraic.is_lazy(place) {
                     let reads = algebraic.values.output_reads(place);
-                    dependent.extend(reads.iter().any(|read| integrated.contains(read)).then_some(place));
+                    dependent.extend(reads.iter().any(|read| clause.of.contains(read)).then_some(place));
                 }
             }
             integrated.extend(implicit.iter().map(|place| algebraic.of[*place]));
@@ -89,6 +92,17 @@ impl<'r> Meeting<'r> {
             Sort { variables: others.collect(), limit: error },
         ];
         Meeting { rule, clause, open, sorts, dependent, implicit }
+    }
+
+    /// The same with its own parameters alone, if some of these can make the sides equal: those of neighbours go on as they are.
+    pub fn alone(mut self) -> Meeting<'r> {
+        let mut own = self.sorts[..2].iter().flat_map(|sort| &sort.variables);
+        let read = |v: &usize| self.open.levels.iter().any(|l| self.rule.atom_reads[l.atom].contains(v));
+        if own.any(read) {
+            self.sorts[2].variables.clear();
+            self.sorts[3].variables.clear();
+        }
+        self
     }
 
     /// True if the module integrates what meets, or what that follows from.
@@ -111,12 +125,27 @@ impl<'r> Meeting<'r> {
         let known = variables.len();
         let switches = self.open.flow.iter().flat_map(|(_, switches)| switches.iter());
         variables.extend(switches.map(|&on| f64::from(u8::from(on))));
-        self.follow(variables, registers);
+        let start = variables.clone();
+        let numbers = 0..self.open.levels.len();
+        let is_met = self.differences(variables, registers).iter().all(|[a, b]| a == b);
+        if is_met && { numbers }.all(|number| self.moving(number).len() <= 1) {
+            // A level, of one variable: there are no other numbers at which it is met.
+            variables.truncate(known);
+            return;
+        }
         for sort in &self.sorts {
-            if self.is_near(variables, registers) {
-                break;
+            // What is small beside the others keeps its own digits, unless it alone can be moved: `x*y` is 0 where y passes 0.
+            for least in [0.0, LEAST_SIZE] {
+                if !self.is_near(variables, registers) {
+                    self.approach(sort, least, variables, registers);
+                }
             }
-            self.approach(sort, variables, registers);
+        }
+        // Values that are known less well than what they follow from are left as they were followed.
+        if !self.dependent.is_empty() && !self.is_near(variables, registers) {
+            *variables = start;
+            variables.truncate(known);
+            return;
         }
         let last = self.open.levels.len() - 1;
         for number in 0..last {
@@ -126,7 +155,7 @@ impl<'r> Meeting<'r> {
         variables.truncate(known);
     }
 
-    /// Computes the values that follow from what is integrated.
+    /// Computes the values that follow from what the module moves.
     fn follow<T: Value>(&self, variables: &mut [T], registers: &mut Registers<T>) {
         let (Some(clause), false) = (self.clause, self.dependent.is_empty()) else { return };
         let algebraic = &clause.algebraic;
@@ -135,7 +164,7 @@ impl<'r> Meeting<'r> {
         self.dependent.iter().for_each(|place| variables[algebraic.of[*place]] = values[*place]);
     }
 
-    /// The differences of the sides that meet, then the equations of unknowns; and the sizes of what each is a difference of.
+    /// The sides that meet, then the equations of unknowns.
     fn differences<T: Value>(
         &self,
         variables: &mut [T],
@@ -167,26 +196,28 @@ impl<'r> Meeting<'r> {
         differences.iter().enumerate().all(is_near)
     }
 
-    /// Newton's method in one sort of variables, each relative to its size: the least changes with which the sides are equal. Without
-    /// effect if these are larger than the error.
-    fn approach(&self, sort: &Sort, variables: &mut [f64], registers: &mut Registers<f64>) {
+    /// Newton's method in one sort of variables, each relative to its size, or to this part of the largest one: the least changes with which
+    /// the sides are equal. Without effect if these are larger than the error.
+    fn approach(&self, sort: &Sort, least: f64, variables: &mut [f64], registers: &mut Registers<f64>) {
         if sort.variables.is_empty() {
             return;
         }
         let start: SmallVec<[f64; 8]> = sort.variables.iter().map(|variable| variables[*variable]).collect();
+        let largest = start.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let sizes: SmallVec<[f64; 8]> = start.iter().map(|x| x.abs().max(least * largest)).collect();
         let mut dual_registers = Vec::new();
         for _ in 0..STEPS {
             let now = self.differences(variables, registers);
             let mut rows: SmallVec<[(Row, f64); 4]> = now.iter().map(|[a, b]| (Row::new(), b - a)).collect();
-            for &variable in &sort.variables {
+            for (&variable, &size) in sort.variables.iter().zip(&sizes) {
                 let mut duals: Vec<Dual<f64>> = variables.iter().map(|x| Dual::constant(*x)).collect();
-                duals[variable].rate = variables[variable].abs();
+                duals[variable].rate = size;
                 let slopes = self.differences(&mut duals, &mut dual_registers);
                 rows.iter_mut().zip(slopes).for_each(|(row, [a, b])| row.0.push(a.rate - b.rate));
             }
             let moves = least_solution(rows, sort.variables.len());
-            for (variable, part) in sort.variables.iter().zip(&moves) {
-                variables[*variable] += part * variables[*variable].abs();
+            for ((variable, size), part) in sort.variables.iter().zip(&sizes).zip(&moves) {
+                variables[*variable] += part * size;
             }
             if self.is_near(variables, registers) {
                 break;
