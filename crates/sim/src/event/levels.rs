@@ -122,8 +122,11 @@ impl EventStage<'_, '_> {
     pub(super) fn settle_at_edge(&mut self, id: ModuleId) {
         let Some(state) = self.world.state(id) else { return };
         let Some(index) = state.rule.get().filter(|rule| self.setup.has_edges[*rule]) else { return };
-        let Some(open) = state.open.as_ref().filter(|open| !open.levels.is_empty()) else { return };
         let rule = &self.setup.model.rules[index];
+        let Some(open) = &state.open else { return };
+        if !open.levels.iter().any(|level| rule.decides_equations(level.atom)) {
+            return;
+        }
         let variables = &mut self.scratch.variables;
         self.world.variables(rule, id, &state.context, self.instant.at, variables);
         put_levels(&self.events.met, (&self.world.tree, id), &state.context, variables);

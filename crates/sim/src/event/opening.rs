@@ -115,7 +115,8 @@ impl EventStage<'_, '_> {
         let rule = &self.setup.model.rules[index];
         change.at == Sign::Zero
             && !rule.jumping_whole[change.atom()]
-            && (self.setup.has_edges[index] || rule.decides_productions(change.atom()))
+            && (self.setup.has_edges[index] && rule.decides_equations(change.atom())
+                || rule.decides_productions(change.atom()))
     }
 
     /// The same, of a module whose event has been found to take place now.
