@@ -373,7 +373,7 @@ fn least_solution(rows: SmallVec<[(Row, f64); 4]>, count: usize) -> Row {
             rest.iter_mut().zip(other).for_each(|(x, y)| *x -= part * y);
         }
         let [whole, left] = [dot(&row, &row).sqrt(), dot(&rest, &rest).sqrt()];
-        if !(left > DEPENDENT * whole) || !right.is_finite() {
+        if left.is_nan() || left <= DEPENDENT * whole || !right.is_finite() {
             continue;
         }
         rest.iter_mut().for_each(|x| *x /= left);
