@@ -37,6 +37,7 @@ mod limits;
 mod linear;
 mod listings;
 mod meadow;
+mod meetings;
 mod moving;
 mod organs;
 mod pages;

@@ -91,6 +91,12 @@ pub enum Binary {
 }
 
 impl Unary {
+    /// True for functions that end at an edge, beyond which they are not defined.
+    pub fn is_partial(self) -> bool {
+        use Unary::{Acos, Asin, Ln, Ln1p, Log10, Sqrt};
+        matches!(self, Sqrt | Ln | Log10 | Ln1p | Asin | Acos)
+    }
+
     /// The functions that a model can call by name.
     pub const NAMED: [(&'static str, Unary); 19] = [
         ("sqrt", Unary::Sqrt),

@@ -348,9 +348,25 @@ impl Program {
     /// The variables that decide over something that jumps: a whole part or a sign, a comparison, the element of an array or the piece
     /// of a curve; ascending.
     pub fn jump_reads(&self) -> Vec<usize> {
+        self.reads_through(|instruction| self.jumps_over(instruction))
+    }
+
+    /// The variables that decide whether an operation is defined that is not so for all numbers, and has an edge where it ends: a root, a
+    /// logarithm, an inverse sine; ascending.
+    pub fn partial_reads(&self) -> Vec<usize> {
+        self.reads_through(|instruction| match *instruction {
+            Instruction::Unary(op, _, a) if op.is_partial() => [Some(a), None],
+            Instruction::Binary(Binary::Pow, _, a, _) => [Some(a), None],
+            Instruction::Right(Binary::Pow, _, a, exponent) if exponent.fract() != 0.0 => [Some(a), None],
+            _ => [None; 2],
+        })
+    }
+
+    /// The variables that some operands of the instructions depend on, ascending.
+    fn reads_through(&self, operands: impl Fn(&Instruction) -> [Option<Register>; 2]) -> Vec<usize> {
         let mut all: BTreeSet<Register> = BTreeSet::new();
         for (place, instruction) in self.code.iter().enumerate() {
-            let mut wanted: BTreeSet<Register> = self.jumps_over(instruction).into_iter().flatten().collect();
+            let mut wanted: BTreeSet<Register> = operands(instruction).into_iter().flatten().collect();
             for before in self.code[..place].iter().rev() {
                 if wanted.is_empty() {
                     break;

@@ -77,6 +77,11 @@ impl Rule {
         self.produces.iter().any(|produce| produce.guard.atoms().any(|(other, _)| other == atom))
     }
 
+    /// True if the condition of a `solve` clause asks for the sign of an atom.
+    pub fn decides_equations(&self, atom: usize) -> bool {
+        self.solves.iter().any(|solve| solve.guard.atoms().any(|(other, _)| other == atom))
+    }
+
     /// True if the behaviour of a module under this rule never changes: no conditions, no productions, at most one
     /// unconditional clause of equations without switches.
     pub fn is_plain(&self) -> bool {

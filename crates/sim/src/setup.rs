@@ -1,7 +1,8 @@
 //! The facts of a run that do not change: the model, the settings, and their consequences.
 
 use super::{Method, Settings};
-use dlsys_model::{CUT, KindId, Model, Produce, Rule, ZeroCrossing};
+use dlsys_expr::Program;
+use dlsys_model::{CUT, KindId, Model, Produce, Rule, Solve, Successor, ZeroCrossing};
 use dlsys_tree::Seed;
 use std::collections::BTreeSet;
 
@@ -27,6 +28,14 @@ pub struct Setup<'m> {
     pub successors_read_context: Vec<bool>,
     /// By rule: see [`levels_decide`].
     pub levels_decide: Vec<bool>,
+    /// By rule: see [`has_meetings`].
+    pub has_meetings: Vec<bool>,
+    /// By rule: some equation of it is not defined on both sides of a level, and no comparison jumps: behind a jump values are kept off their levels.
+    pub has_edges: Vec<bool>,
+    /// By rule: some production makes modules that have such equations.
+    pub leads_to_edges: Vec<bool>,
+    /// By rule and production: see [`is_delicate`].
+    pub is_delicate: Vec<Vec<bool>>,
     /// By rule and production: something jumps in its condition or its successors.
     pub jumps: Vec<Vec<bool>>,
     /// By rule and production: the variables over which something jumps in its successors.
@@ -80,6 +89,10 @@ impl<'m> Setup<'m> {
             kinds_with_context,
             successors_read_context: successors_read_context.collect(),
             levels_decide: model.rules.iter().map(levels_decide).collect(),
+            has_meetings: model.rules.iter().map(has_meetings).collect(),
+            has_edges: model.rules.iter().map(|rule| has_edges(rule) && !has_jumps(rule)).collect(),
+            leads_to_edges: model.rules.iter().map(|rule| leads_to_edges(model, rule)).collect(),
+            is_delicate: model.rules.iter().map(|rule| is_delicate(model, rule)).collect(),
             jumps: model.rules.iter().map(jumps).collect(),
             jump_reads: model.rules.iter().map(jump_reads).collect(),
             has_jumps: model.rules.iter().map(has_jumps).collect(),
@@ -115,6 +128,59 @@ pub fn levels_decide(rule: &Rule) -> bool {
     let asks = rule.produces.iter().any(|produce| asks_for_jumps(rule, produce));
     asks || !meets.is_empty()
         && rule.produces.iter().any(|produce| produce.outcome.jump_reads().any(|v| meets.contains(&v)))
+}
+
+/// True if a production depends on sides that meet where no variable that moves by itself alone meets a level: `x + y = 3.4`, or
+/// `v = 3.4` of a value that the module computes from others.
+fn has_meetings(rule: &Rule) -> bool {
+    let is_meeting = |atom: usize, clause: Option<&Solve>, crossing: &ZeroCrossing| match crossing {
+        ZeroCrossing::Search { level: None, .. } => !rule.jumping_whole[atom],
+        ZeroCrossing::Search { level: Some((variable, _)), .. } => {
+            clause.is_some_and(|clause| clause.algebraic.of.contains(variable))
+        }
+        _ => false,
+    };
+    let meets = |atom: usize| {
+        let mut solves = rule.solves.iter();
+        is_meeting(atom, None, &rule.zero_crossings_at_rest[atom])
+            || solves.any(|solve| is_meeting(atom, Some(solve), &solve.zero_crossings[atom]))
+    };
+    (0..rule.atoms.len()).any(|atom| rule.decides_productions(atom) && meets(atom))
+}
+
+/// True if some equation of a rule has a function that ends at an edge, beyond which it is not defined.
+fn has_edges(rule: &Rule) -> bool {
+    let programs = rule.solves.iter().flat_map(|solve| [&solve.rates, &solve.algebraic.values]);
+    programs.into_iter().any(|program| !program.partial_reads().is_empty())
+}
+
+/// True for a kind with such a rule.
+fn is_at_edge(model: &Model, kind: KindId) -> bool {
+    model.kinds.get(kind).rules.iter().any(|rule| has_edges(&model.rules[*rule]))
+}
+
+/// The kinds of the modules that a production makes.
+fn kinds_of(produce: &Produce) -> impl Iterator<Item = KindId> {
+    produce.outcome.successors.iter().flat_map(Successor::kinds)
+}
+
+/// True if some production of a rule makes modules with equations that end at an edge.
+fn leads_to_edges(model: &Model, rule: &Rule) -> bool {
+    rule.produces.iter().flat_map(kinds_of).any(|kind| is_at_edge(model, kind))
+}
+
+/// By production: a rounding of the values at the instant may decide over its successor. Something jumps there, or ends at an edge, it has
+/// weights, or equations of the new modules end at an edge.
+fn is_delicate(model: &Model, rule: &Rule) -> Vec<bool> {
+    let is_partial = |program: &Program| !program.partial_reads().is_empty();
+    let of = |produce: &Produce| {
+        let outcome = &produce.outcome;
+        outcome.weights.is_some()
+            || outcome.jump_reads().next().is_some()
+            || outcome.successors.iter().flat_map(Successor::programs).any(is_partial)
+            || kinds_of(produce).any(|kind| is_at_edge(model, kind))
+    };
+    rule.produces.iter().map(of).collect()
 }
 
 /// True if the condition of a production compares whole parts or signs.

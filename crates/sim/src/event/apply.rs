@@ -174,12 +174,15 @@ impl EventStage<'_, '_> {
             let clause = &rule.produces[fire.produce];
             let around = context_of(model, self.world, &self.events.steps.contexts, fire, &mut contexts);
             let (now, variables) = (self.instant.at, &mut self.scratch.variables);
-            match self.setup.successors_read_context[fire.rule] || self.log.records() {
+            match self.setup.successors_read_context[fire.rule]
+                || self.setup.has_meetings[fire.rule]
+                || self.log.records()
+            {
                 true => self.world.variables(rule, fire.id, around, now, variables),
                 false => self.world.variables_read((rule, &[]), fire.id, around, now, variables),
             }
             put_levels(&self.events.met, (&self.world.tree, fire.id), around, variables);
-            set_levels(self.world, fire, (rule, self.setup.levels_decide[fire.rule]), self.scratch);
+            set_levels(self.setup, self.world, fire, self.scratch);
             if self.setup.is_algebraic {
                 self.note_values(fire.id);
             }

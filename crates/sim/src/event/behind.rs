@@ -8,6 +8,7 @@
 
 use super::EventStage;
 use super::levels::put_levels;
+use crate::detect::signs::opposite;
 use crate::world::path::Path;
 use crate::world::state::{Change, Signs};
 use dlsys_expr::Dual;
@@ -16,6 +17,9 @@ use dlsys_tree::{ModuleId, SimTime};
 
 /// No event is put off by more than this part of the present time, or of 1: then what jumps moves less than its rounding.
 const LONGEST_DELAY: f64 = 1e-6;
+
+/// Sides of what is integrated have parted by more than rounding after this part of the present time, or of 1.
+const LONGEST_BLUR: f64 = 1e-12;
 
 /// What is integrated goes on from numbers that differ by a rounding from those of the instant, so it has to be past the jump by this part of its size.
 const CLEARANCE: f64 = 8.0 * f64::EPSILON;
@@ -91,6 +95,11 @@ impl<'m> EventStage<'_, 'm> {
     /// instant become those by the numbers, where that is now.
     pub(super) fn behind_jumps(&mut self, id: ModuleId, touched: &mut [Change]) -> When {
         let Some(rule) = self.world.state(id).and_then(|state| state.rule.get()) else { return When::Now };
+        if self.setup.leads_to_edges[rule]
+            && let When::Later(time) = self.behind_edge(id, rule, touched)
+        {
+            return When::Later(time);
+        }
         if !self.setup.has_jumps[rule] {
             return When::Now;
         }
@@ -129,6 +138,44 @@ impl<'m> EventStage<'_, 'm> {
         let later = self.signs_later(id, rule, touched, longest, 0.0);
         for (place, change) in touched.iter_mut().enumerate().filter(|(place, _)| question.jumps[*place]) {
             (change.at, change.after) = (now[place], later[place]);
+        }
+        When::Now
+    }
+
+    /// When sides have met of which neighbours' values are a part, where a production leads to equations that end at an edge (`sqrt(x + y - 3.4)`): once
+    /// their numbers, which go on as they are, are no rounding beyond it.
+    fn behind_edge(&mut self, id: ModuleId, rule: usize, touched: &[Change]) -> When {
+        let of_rule = &self.setup.model.rules[rule];
+        let is_around = |atom: usize| {
+            let around = of_rule.parameters.len()..of_rule.time_variable();
+            let jumps = of_rule.jumping[atom] || of_rule.jumping_whole[atom];
+            !jumps && of_rule.atom_reads[atom].iter().any(|v| around.contains(v))
+        };
+        let met: Vec<Change> = (touched.iter().copied())
+            .filter(|change| change.at == Sign::Zero && is_around(change.atom()))
+            .collect();
+        if met.is_empty() {
+            return When::Now;
+        }
+        let is_integrated = self.is_integrated(id, rule, &met, &vec![true; met.len()]);
+        let clearances = if is_integrated { &[0.0, CLEARANCE][..] } else { &[0.0] };
+        let at = self.instant.at;
+        self.flows.known_rates.clear();
+        let is_beyond = |stage: &mut Self, delay: f64| {
+            clearances.iter().any(|clearance| {
+                let signs = stage.signs_later(id, rule, &met, delay, *clearance);
+                signs.iter().zip(&met).any(|(sign, change)| *sign == opposite(change.after))
+            })
+        };
+        if !is_beyond(self, 0.0) {
+            return When::Now;
+        }
+        let mut delay = at.resolution().max(SHORTEST_DELAY);
+        while delay <= LONGEST_BLUR * at.to_f64().abs().max(1.0) {
+            if !is_beyond(self, delay) {
+                return When::Later(at.after(delay));
+            }
+            delay *= 2.0;
         }
         When::Now
     }

@@ -28,6 +28,7 @@ mod lazy;
 mod levels;
 mod lookup;
 mod matching;
+mod meeting;
 mod modes;
 mod opening;
 mod ties;

@@ -90,17 +90,33 @@ impl EventStage<'_, '_> {
         self.world.rebase(id, now);
         // Where the instant is known from a level, the value there is that level, not a rounding of it.
         for change in touched {
-            let Some((variable, value)) = change.level() else { continue };
-            let places = self.world.tree.places(id);
-            match variable.checked_sub(places.len()) {
-                None => self.world.tree.set_value(places.start + variable, value),
-                Some(of_context) => self.note_level_of_neighbour(id, of_context, value),
+            let level = change.level();
+            if let Some((variable, value)) = level {
+                let places = self.world.tree.places(id);
+                match variable.checked_sub(places.len()) {
+                    None => self.world.tree.set_value(places.start + variable, value),
+                    Some(of_context) => self.note_level_of_neighbour(id, of_context, value),
+                }
+            } else if !self.is_meeting(id, change) {
+                continue;
             }
             if let Some(open) = self.world.state_mut(id).and_then(|state| state.open.as_mut()) {
-                let (atom, after) = (change.atom(), change.after);
-                open.levels.push(Level { atom, variable, value, after });
+                open.levels.push(Level { atom: change.atom(), level, after: change.after });
             }
         }
+        self.settle_at_edge(id);
+    }
+
+    /// True if sides meet at the instant, no variable that alone would do so, and a production depends on them or equations that end there.
+    fn is_meeting(&self, id: ModuleId, change: &Change) -> bool {
+        let rule = self.world.state(id).and_then(|state| state.rule.get());
+        let concerns = |rule: &usize| self.setup.has_meetings[*rule] || self.setup.has_edges[*rule];
+        let Some(index) = rule.filter(concerns) else { return false };
+        let rule = &self.setup.model.rules[index];
+        change.at == Sign::Zero
+            && !rule.jumping_whole[change.atom()]
+            && (self.setup.has_edges[index] && rule.decides_equations(change.atom())
+                || rule.decides_productions(change.atom()))
     }
 
     /// The same, of a module whose event has been found to take place now.
@@ -253,7 +269,7 @@ impl EventStage<'_, '_> {
             return None;
         }
         let (id, rule) = (state.id, state.rule.get()?);
-        if self.setup.levels_decide[rule] || self.setup.has_jumps[rule] {
+        if self.setup.levels_decide[rule] || self.setup.has_jumps[rule] || self.setup.has_meetings[rule] {
             return None;
         }
         if self.setup.kinds_with_context[self.world.tree.kind(id).index()] || !state.next.changes().is_empty()

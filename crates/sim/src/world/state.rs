@@ -297,16 +297,16 @@ pub struct Open {
     pub behind: bool,
     /// No side is near the other: signs are what they are.
     pub clear: bool,
-    /// The variables that meet a level at the instant: what follows from that gets the level, not a rounding of it.
+    /// The sides that meet at the instant: what follows from that gets numbers at which they are equal, not roundings of these.
     pub levels: SmallVec<[Level; 1]>,
 }
 
-/// A variable at the level at which the sides of an atom meet.
+/// The sides of an atom that meet at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Level {
     pub atom: usize,
-    pub variable: usize,
-    pub value: f64,
+    /// The one variable that moves, and its value there, if there is only one.
+    pub level: Option<(usize, f64)>,
     /// The sign of the difference of the sides just after.
     pub after: Sign,
 }
