@@ -153,6 +153,9 @@ fn equations_begin_at_their_edge() {
     }
 }
 
+/// An expression of x and y, and its value.
+type Combination = (&'static str, fn(f64, f64) -> f64);
+
 /// Random sums and products of what grows: each meets any level above its start once, and what is asked of it there has one answer.
 #[test]
 fn random_combinations_are_at_their_levels() {
@@ -164,7 +167,7 @@ fn random_combinations_are_at_their_levels() {
         "0.6*tanh(1 + x*y)",
     ];
     let others = ["0.3*cos(x)^2 + 0.1", "0.2*sin(y) + 0.35", "0.1*x/(1 + y^2)", "0.2*y + 0.1", "0.15"];
-    let combinations: [(&str, fn(f64, f64) -> f64); 6] = [
+    let combinations: [Combination; 6] = [
         ("x + y", |x, y| x + y),
         ("x*y", |x, y| x * y),
         ("x^2 + y^2", |x, y| x * x + y * y),

@@ -209,6 +209,19 @@ impl Dense {
         self.stretch(&mut c, lo, hi)
     }
 
+    /// The coefficients of one component along the stretch from `lo` to `hi`, by powers of the position in the stretch.
+    pub fn powers(&self, component: usize, lo: f64, hi: f64) -> Coefficients {
+        let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
+        c[..=self.degree].copy_from_slice(self.of(component));
+        // The degrees of most steps have code without loops.
+        match self.degree {
+            4 => to_powers(&mut c[..5], lo, hi),
+            MAX_DEGREE => to_powers(&mut c, lo, hi),
+            degree => to_powers(&mut c[..=degree], lo, hi),
+        }
+        c
+    }
+
     /// Adds a component, times a factor, to the coefficients of a sum.
     pub fn add_to(&self, component: usize, factor: f64, sum: &mut Coefficients) {
         sum.iter_mut().zip(self.of(component)).for_each(|(sum, c)| *sum += factor * c);
@@ -258,6 +271,23 @@ fn cut(c: &mut [f64], lo: f64, hi: f64) {
                 c[i] = mix(c[i], c[i + 1], cut);
             }
         }
+    }
+}
+
+/// Writes a polynomial, restricted to the positions from `lo` to `hi`, by powers of the position there.
+#[inline(always)]
+fn to_powers(c: &mut [f64], lo: f64, hi: f64) {
+    cut(c, lo, hi);
+    let degree = c.len() - 1;
+    for level in 1..=degree {
+        for i in (level..=degree).rev() {
+            c[i] -= c[i - 1];
+        }
+    }
+    let mut choose = 1.0;
+    for (i, c) in c.iter_mut().enumerate().skip(1) {
+        choose *= (degree + 1 - i) as f64 / i as f64;
+        *c *= choose;
     }
 }
 
@@ -311,6 +341,17 @@ mod tests {
             let slope = (dense.value(0, (at + e).min(1.0)) - dense.value(0, (at - e).max(0.0)))
                 / ((at + e).min(1.0) - (at - e).max(0.0));
             prop_assert!(piece.rate.lo - 1e-3 <= slope && slope <= piece.rate.hi + 1e-3);
+        }
+
+        #[test]
+        fn powers_are_the_same_polynomial(
+            c in proptest::collection::vec(-10.0..10.0f64, 5),
+            a in 0.0..1.0f64, w in 0.01..1.0f64, s in 0.0..1.0f64,
+        ) {
+            let dense = Dense::new(SimTime::ZERO, None, 1.0, 4, c);
+            let lo = a * (1.0 - w);
+            let value = dense.powers(0, lo, lo + w).iter().rev().fold(0.0, |sum, c| sum * s + c);
+            prop_assert!((value - dense.value(0, lo + s * w)).abs() < 1e-12);
         }
 
         #[test]

@@ -112,3 +112,90 @@ fn events_met_by_formulas_leave_stiff_linear_tissues_without_steps() {
     let often: Vec<f64> = (1..=230).map(|n| f64::from(n) / 100.0).collect();
     assert_eq!(steps(&text(""), &often), clocks);
 }
+
+/// A tissue with linear equations: cells that divide or turn into others by their clocks and by what diffuses, beside some whose content
+/// is a formula.
+fn linear_tissue(
+    (d, flow, decay): (f64, f64, f64),
+    (kind, guard): (usize, usize),
+    cells: &[(f64, f64)],
+) -> String {
+    let successor =
+        ["F_v(0, 0.5*c + 60)", "F_v(0.05, c) F_v(0.37, 0.9*c)", "F_v(0.1, 0.8*c) F_h(1, c)"][kind % 3];
+    let (held, met) = [
+        ("", ""),
+        (" & c > 40", "  if c = 40 produce F_h(x, c)\n"),
+        (" & c < 170", "  if c = 170 produce F_v(0.5*x, 100)\n"),
+    ][guard % 3];
+    let formula = ["0.15*(255 - c)", "-0.4*c", "3", "0"][(kind + guard) % 4];
+    let cells: String = cells.iter().map(|(x, c)| format!("F_v({x}, {c}) ")).collect();
+    format!(
+        "initial string: F_h(1, 255) {cells} F_h(0.5, 90) {cells} F_h(1, 200)\n\
+         F(y, l) < F_v(x, c) > F(z, r):\n  \
+         if x < 1{held} solve dx/dt = 0.1 + 0.5*x, dc/dt = {d}*(l + r - 2c) + {flow}*(l - c) - {decay}*c\n  \
+         if x = 1{held} produce {successor}\n{met}\
+         F_h(x, c): solve dx/dt = 0.1*(1 - x), dc/dt = {formula}\n"
+    )
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig { cases: 40, ..Default::default() })]
+
+    /// Linear equations are followed by polynomials, and by steps of pairs where those lead too short a way: both against global steps.
+    #[test]
+    fn linear_tissues_have_the_events_and_values_of_global_steps(
+        (d, flow, decay) in (-2.0..1.5f64, 0.0..1.0f64, 0.0..0.3f64),
+        choice in (0..3usize, 0..3usize),
+        cells in proptest::collection::vec((0.0..0.95f64, 60.0..140.0f64), 3..14),
+    ) {
+        let d = 10f64.powf(d);
+        let text = linear_tissue((d, if flow < 0.5 { 0.0 } else { flow * d }, decay), choice, &cells);
+        let settings = Settings { tolerance: 1e-6, ..Settings::default() };
+        let reference =
+            Settings { scheduler: Scheduler::Global, method: Method::Dop853, tolerance: 1e-10, ..settings };
+        let (auto, exact) = (state(&text, settings, 3.0), state(&text, reference, 3.0));
+        proptest::prop_assert_eq!(auto.1, exact.1, "{}", &text);
+        let error = difference(&auto.0, &exact.0);
+        proptest::prop_assert!(error <= 2e-5, "{} in\n{}", error, &text);
+    }
+}
+
+/// A region may have members and no components.
+#[test]
+fn readers_without_equations_have_events_beside_one_that_is_integrated() {
+    let text = "initial string: P(0.869) A(0, 0)\nP(x): solve dx/dt = 1.302 - 0.688*t - 0.116*t^2\n\
+        P(x) < A(n, s):\n  if abs(x - 1.4816) < 1.5e-6 & s = 0 produce A(n + 1, 1)\n  \
+        if abs(x - 1.4816) > 1.5e-6 & s = 1 produce A(n + 1, 0)\n";
+    let (values, events, _) = state(text, Settings::default(), 3.0);
+    assert_eq!((events, values[1]), (4, 4.0));
+}
+
+/// Polynomials take no trials, and what is observed changes nothing.
+#[test]
+fn a_linear_tissue_with_events_rejects_no_step() {
+    let cells: Vec<(f64, f64)> =
+        (0..40).map(|n| (f64::from(n) * 0.618 % 0.95, 60.0 + f64::from(n * 37 % 80))).collect();
+    let text = linear_tissue((0.03, 0.0, 0.03), (1, 1), &cells);
+    let run = |settings: Settings, times: &[f64]| {
+        let session = Session::from_text("tissue.dls", &text, &[]).expect("a model");
+        let mut simulation = session.simulate(settings).expect("it starts");
+        let mut string = ModuleString::default();
+        times.iter().for_each(|t| simulation.at(*t, &mut string).expect("it runs"));
+        let values: Vec<f64> = string.iter().flat_map(|module| module.parameters.to_vec()).collect();
+        (values, simulation.stats())
+    };
+    let auto = Settings { tolerance: 1e-6, ..Settings::default() };
+    let (values, stats) = run(auto, &[4.0]);
+    assert!(
+        stats.events > 100 && stats.rejected == 0,
+        "{} events, {} rejected",
+        stats.events,
+        stats.rejected
+    );
+    let (steps, pair) = run(Settings { method: Method::Dop853, ..auto }, &[4.0]);
+    assert!(difference(&values, &steps) <= 1e-6);
+    let [of_powers, of_pair] = [stats, pair].map(|stats| stats.rhs_evaluations);
+    assert!(of_powers < of_pair, "{of_powers} products and {of_pair} evaluations");
+    let often: Vec<f64> = (1..=200).map(|n| f64::from(n) / 50.0).collect();
+    assert_eq!(run(auto, &often).0, values);
+}

@@ -11,7 +11,7 @@
 //! algebra ─▶ newton ─▶ matrix, meeting (where solutions meet) ─▶ blend
 //! system ─▶ rows (table of equations) ─▶ algebra, lanes, aggregates ─▶ equations (right-hand side) ─▶ integrator
 //! columns ─▶ the equations of explicit steps without a table, sections ─▶ of several threads
-//! linear ─▶ exponentials of matrices in place of steps
+//! linear ─▶ exponentials of matrices in place of steps, taylor ─▶ polynomials in place of stages, for reintegration
 //! ```
 
 pub mod aggregates;
@@ -34,6 +34,7 @@ mod sections;
 mod sift;
 mod step;
 pub mod system;
+mod taylor;
 mod traffic;
 
 use crate::flow::coupled::couple::Affected;
@@ -80,6 +81,8 @@ pub struct Coupled {
     pub since_mark: usize,
     /// Members whose rates may have pulses.
     pulsing: Vec<ModuleId>,
+    /// How far the last polynomials of linear equations for all members led; 0 if none were tried.
+    reach: f64,
     /// How often events cut the trajectories of members.
     traffic: Traffic,
 }

@@ -31,6 +31,7 @@ use crate::flow::FlowStage;
 use crate::flow::coupled::columns::{Numbers, Whole};
 use crate::flow::coupled::equations::{Equations, RateWorkspace};
 use crate::flow::coupled::system::{Membership, System, integrated};
+use crate::flow::coupled::taylor::{Members, Taylor};
 use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator, StepRequest};
 use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
@@ -39,7 +40,7 @@ use crate::world::neighbours::reads;
 use crate::world::prefetch::{fetch, is_large};
 use crate::world::state::{Control, State};
 use crate::world::states::States;
-use dlsys_ode::Dense;
+use dlsys_ode::{Dense, Method};
 use dlsys_tree::{ModuleId, SimTime, room};
 use smallvec::SmallVec;
 
@@ -56,7 +57,8 @@ pub struct Reintegration {
     strength: f64,
     /// Those of the components in the system of the region, while that is made.
     numbers: Numbers,
-    /// The equations of the region.
+    /// The equations of the region, where they are linear; otherwise those that steps are made of.
+    pub(super) taylor: Taylor,
     system: System,
     memory: RateWorkspace,
     region: Region,
@@ -92,7 +94,7 @@ impl Default for Reintegration {
         // The end of the common step limits them.
         integrator.expect_cuts(true);
         let (control, numbers, system, memory) = Default::default();
-        let (region, trial, stages, y) = Default::default();
+        let (region, trial, stages, taylor, y) = Default::default();
         Reintegration {
             integrator,
             control,
@@ -100,6 +102,7 @@ impl Default for Reintegration {
             reaches: Default::default(),
             strength: 0.0,
             numbers,
+            taylor,
             system,
             memory,
             region,
@@ -129,7 +132,7 @@ impl Reintegration {
 
     /// Evaluations of one module's equations so far.
     pub fn evaluations(&self) -> u64 {
-        self.integrator.evaluations()
+        self.integrator.evaluations() + self.taylor.products()
     }
 
     /// What steps have cost so far.
@@ -356,7 +359,17 @@ impl FlowStage<'_, '_> {
         let solution = self.world.coupled.as_ref()?;
         let TrialSolution { stretches, components, rings } = trial;
         let Reintegration {
-            integrator, control, numbers, system, memory, stages, y, reaches, strength, ..
+            integrator,
+            control,
+            numbers,
+            taylor,
+            system,
+            memory,
+            stages,
+            y,
+            reaches,
+            strength,
+            ..
         } = &mut self.flows.coupled.reintegration;
         stretches.clear();
         components.clear();
@@ -386,8 +399,21 @@ impl FlowStage<'_, '_> {
         let number_of = |component: u32| numbers.of(component);
         let rules = &self.setup.model.rules;
         let frozen = self.setup.settings.is_sliced();
-        let modules = Membership { world: &*self.world, members: &region.members, start: now, frozen };
+        let tolerance = INNER_TOLERANCE * self.setup.coupled_settings.tolerance;
+        // The neglected change at the edge of the region adds to the error.
+        control.error = self.flows.coupled.control.error + tolerance;
         let is_explicit = stiff.is_none() && !control.stiff && !frozen;
+        let is_auto = self.setup.settings.method == Method::Auto;
+        if is_explicit && is_auto && !self.setup.has_pulses {
+            let world = &*self.world;
+            let members = Members { world, rules, members: &region.members, numbers: Some(numbers) };
+            if taylor.solve(members, solution, (y, now), (tolerance, control.error), stretches) {
+                self.log.stats.steps += stretches.len() as u64;
+                numbers.take_back(components);
+                return Some(());
+            }
+        }
+        let modules = Membership { world: &*self.world, members: &region.members, start: now, frozen };
         system.clear(now);
         let is_bare = is_explicit && system.gather(rules, &modules, y.len(), number_of);
         if !is_bare {
@@ -396,9 +422,6 @@ impl FlowStage<'_, '_> {
         }
         numbers.take_back(components);
         integrator.restart(self.setup.settings.method, y.len());
-        // The neglected change at the edge of the region adds to the error.
-        control.error =
-            self.flows.coupled.control.error + INNER_TOLERANCE * self.setup.coupled_settings.tolerance;
         if let Some(cause) = stiff {
             // After an event all changes fast again, however long the last steps were.
             (control.stiff, control.size) = (true, BOLD * reaches[cause as usize].first);

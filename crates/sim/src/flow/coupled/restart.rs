@@ -32,6 +32,9 @@ impl FlowStage<'_, '_> {
         }
         self.flows.coupled.members = members;
         (self.flows.coupled.reintegrated, self.flows.coupled.pending) = (false, false);
+        if self.step_by_powers(at) {
+            return Ok(());
+        }
         self.choose_method(at);
         if self.flows.coupled.members.is_empty() {
             return Ok(());

@@ -28,18 +28,7 @@ impl Unknowns {
             return Some(());
         }
         let formula = &formulas[i as usize];
-        let x = formula.trajectory.at(formula.x, formula.offset);
-        let Chain { mut links, inflow } = match &formula.trajectory {
-            Trajectory::Polynomial([c, 0.0, 0.0, 0.0]) => Chain { links: smallvec![(0.0, x)], inflow: *c },
-            Trajectory::Riccati(law) => {
-                let decay = law.exponential()?.1;
-                // x' = rate + decay (x - x(start))
-                let inflow = formula.trajectory.rate(formula.offset) - decay * x;
-                Chain { links: smallvec![(decay, x)], inflow }
-            }
-            other => other.terms(formula.x)?.chain(formula.offset)?,
-        };
-        links[0].1 = x;
+        let Chain { links, inflow } = chain(&formula.trajectory, formula.x, formula.offset)?;
         let Problem { entries, b, y, .. } = &mut self.problem;
         let n = y.len() as u32;
         self.inputs[i as usize] = n;
@@ -53,6 +42,23 @@ impl Unknowns {
         b[last as usize] = inflow;
         Some(())
     }
+}
+
+/// A closed form as a chain of linear equations with real eigenvalues, from a time since its start, at which its value was `x`; None if
+/// it is none.
+pub fn chain(trajectory: &Trajectory, x: f64, offset: f64) -> Option<Chain> {
+    let value = trajectory.at(x, offset);
+    let mut chain = match trajectory {
+        Trajectory::Polynomial([c, 0.0, 0.0, 0.0]) => Chain { links: smallvec![(0.0, value)], inflow: *c },
+        Trajectory::Riccati(law) => {
+            let decay = law.exponential()?.1;
+            // x' = rate + decay (x - x(start))
+            Chain { links: smallvec![(decay, value)], inflow: trajectory.rate(offset) - decay * value }
+        }
+        other => other.terms(x)?.chain(offset)?,
+    };
+    chain.links[0].1 = value;
+    Some(chain)
 }
 
 impl Linear {

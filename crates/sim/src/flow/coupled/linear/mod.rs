@@ -23,6 +23,7 @@ mod tests;
 
 use crate::world::state::Control;
 use crate::{Settings, Stats};
+pub use build::chain;
 use dlsys_ode::Dense;
 use dlsys_tree::SimTime;
 use poles::Poles;

@@ -1,0 +1,281 @@
+//! The rows of linear equations, written from the states of modules: what each reads, with a number for each coefficient.
+
+use crate::flow::coupled::columns::Numbers;
+use crate::flow::coupled::linear::chain;
+use crate::trajectory::Trajectory;
+use crate::world::World;
+use crate::world::prefetch::prefetch;
+use crate::world::state::State;
+use dlsys_model::{Read, Rule};
+use dlsys_ode::MAX_DEGREE;
+use dlsys_tree::{ModuleId, SimTime};
+
+/// A formula is looked for among so many that were met last: neighbours in the string read the same.
+const RECENT: usize = 4;
+/// Entries of a row side by side: those of a cell in a filament.
+const SIDE_BY_SIDE: usize = 3;
+
+/// The equation of one parameter of a clause: a constant, and a coefficient for each variable that is read.
+#[derive(Clone, Debug)]
+pub struct LinearEquation {
+    parameter: usize,
+    constant: f64,
+    terms: Vec<(Read, f64)>,
+}
+
+/// Those of a clause; None if they are not linear with coefficients that depend on nothing.
+pub type LinearClause = Option<Box<[LinearEquation]>>;
+
+/// A component outside the region that a row reads.
+#[derive(Clone, Copy, Debug)]
+pub struct Input {
+    row: u32,
+    pub component: u32,
+    pub coefficient: f64,
+    /// Its Taylor coefficients along the piece, times the coefficient.
+    pub powers: [f64; MAX_DEGREE + 1],
+}
+
+/// A row of A: no loop is needed over its entries, of which those that are not there are zero.
+#[derive(Clone, Copy, Debug, Default)]
+struct Row {
+    columns: [u32; SIDE_BY_SIDE],
+    values: [f64; SIDE_BY_SIDE],
+}
+
+/// Modules whose equations are solved together, in the order of their components.
+#[derive(Clone, Copy)]
+pub struct Members<'r> {
+    pub world: &'r World,
+    pub rules: &'r [Rule],
+    pub members: &'r [ModuleId],
+    /// The numbers of the components here; None if they are those of the coupled solution.
+    pub numbers: Option<&'r Numbers>,
+}
+
+impl Members<'_> {
+    fn number(&self, component: u32) -> Option<u32> {
+        match self.numbers {
+            Some(numbers) => numbers.of(component),
+            None => Some(component),
+        }
+    }
+}
+
+/// What is known of clauses, by rule and clause.
+pub type Clauses = Vec<Vec<Option<LinearClause>>>;
+
+/// The rows of A, those of closed forms last, and what else is in the equations.
+#[derive(Clone, Debug, Default)]
+pub struct Rows {
+    rows: Vec<Row>,
+    /// Entries that the rows have no room for: row, column and value.
+    others: Vec<(u32, u32, f64)>,
+    constants: Vec<f64>,
+    /// What is read from outside.
+    pub inputs: Vec<Input>,
+    /// Closed forms: where the parameter stands in the tree, and its row.
+    formulas: Vec<(usize, u32)>,
+    /// Decay and inflow of the rows of closed forms; no inflow where the next one flows in.
+    links: Vec<(f64, Option<f64>)>,
+    /// The values of all rows: at first those at the start.
+    pub y: Vec<f64>,
+    /// The number of components, whose rows come first.
+    pub components: usize,
+    /// The largest row sum of A.
+    pub norm: f64,
+}
+
+impl Rows {
+    /// Writes the equations of modules, given the values of their components; None if some are not linear with constant coefficients.
+    pub fn write(&mut self, clauses: &mut Clauses, all: Members, y: &[f64], now: SimTime) -> Option<()> {
+        let Members { world, rules, .. } = all;
+        let Rows { rows, others, constants, inputs, formulas, links, .. } = self;
+        rows.clear();
+        others.clear();
+        constants.clear();
+        inputs.clear();
+        formulas.clear();
+        links.clear();
+        self.components = y.len();
+        self.y.clear();
+        self.y.extend_from_slice(y);
+        self.rows.reserve_exact(y.len());
+        self.constants.reserve_exact(y.len());
+        for (at, &id) in all.members.iter().enumerate() {
+            if all.numbers.is_none() {
+                prefetch(world, all.members, at);
+            }
+            let state = world.state(id)?;
+            let Some((rule, solve)) = state.rule.get().zip(state.solve.get()) else { continue };
+            if rules[rule].solves[solve].stepping.components(state.numeric_only).is_empty() {
+                continue;
+            }
+            if state.numeric_only {
+                return None;
+            }
+            for equation in known(clauses, rules, rule, solve).as_ref()?.iter() {
+                self.push(all, state, equation, now)?;
+            }
+        }
+        for n in 0..self.links.len() {
+            let (decay, inflow) = self.links[n];
+            let (row, mut count) = (self.begin(inflow.unwrap_or(0.0)), 0);
+            self.add(row, &mut count, (row, decay));
+            if inflow.is_none() {
+                self.add(row, &mut count, (row + 1, 1.0));
+            }
+        }
+        if self.rows.len() != self.y.len() {
+            return None;
+        }
+        let sum = |row: &Row| row.values.iter().map(|a| a.abs()).sum::<f64>();
+        self.norm = self.rows.iter().map(sum).fold(0.0, f64::max);
+        for others in self.others.chunk_by(|a, b| a.0 == b.0) {
+            let more: f64 = others.iter().map(|other| other.2.abs()).sum();
+            self.norm = self.norm.max(sum(&self.rows[others[0].0 as usize]) + more);
+        }
+        self.norm.is_finite().then_some(())
+    }
+
+    /// Adds the row of an equation of a module.
+    #[inline]
+    fn push(&mut self, all: Members, state: &State, equation: &LinearEquation, now: SimTime) -> Option<()> {
+        let world = all.world;
+        let (row, mut count) = (self.begin(equation.constant), 0);
+        let Trajectory::Coupled(component) = *state.trajectories.get(equation.parameter)? else {
+            return None;
+        };
+        if all.number(component) != Some(row) {
+            return None;
+        }
+        for &(read, coefficient) in &equation.terms {
+            let (module, moves) = match read.neighbour.map(|n| state.context.context()[n]) {
+                None => (state.id, Some(state)),
+                Some(module) => (module, world.state(module)),
+            };
+            let place = || world.tree.places(module).start + read.parameter;
+            let moves = moves.and_then(|state| Some((state, state.trajectories.get(read.parameter)?)));
+            match moves {
+                None | Some((_, Trajectory::Rest | Trajectory::Step(_))) => {
+                    self.constants[row as usize] += coefficient * world.tree.values()[place()];
+                }
+                Some((_, &Trajectory::Coupled(component))) => match all.number(component) {
+                    Some(column) => self.add(row, &mut count, (column, coefficient)),
+                    None => {
+                        let powers = [0.0; MAX_DEGREE + 1];
+                        self.inputs.push(Input { row, component, coefficient, powers });
+                    }
+                },
+                Some((of, trajectory)) => {
+                    let column = self.formula(trajectory, place(), world, now.since(of.since))?;
+                    self.add(row, &mut count, (column, coefficient));
+                }
+            }
+        }
+        Some(())
+    }
+
+    /// The row of a closed form, at a place in the values of the tree, that began so long ago.
+    fn formula(&mut self, trajectory: &Trajectory, place: usize, world: &World, offset: f64) -> Option<u32> {
+        if let Some(known) = self.formulas.iter().rev().take(RECENT).find(|known| known.0 == place) {
+            return Some(known.1);
+        }
+        let row = (self.components + self.links.len()) as u32;
+        let chain = chain(trajectory, world.tree.values()[place], offset)?;
+        self.y.extend(chain.links.iter().map(|link| link.1));
+        let last = chain.links.len() - 1;
+        let links = chain.links.iter().enumerate();
+        self.links.extend(links.map(|(n, link)| (link.0, (n == last).then_some(chain.inflow))));
+        self.formulas.push((place, row));
+        Some(row)
+    }
+
+    /// Begins the next row with its constant, and gives its number.
+    fn begin(&mut self, constant: f64) -> u32 {
+        self.rows.push(Row::default());
+        self.constants.push(constant);
+        self.rows.len() as u32 - 1
+    }
+
+    /// Adds an entry, by column and value, to the row that was begun last, which has so many.
+    fn add(&mut self, row: u32, count: &mut usize, (column, value): (u32, f64)) {
+        let place = &mut self.rows[row as usize];
+        if *count < SIDE_BY_SIDE {
+            (place.columns[*count], place.values[*count]) = (column, value);
+            *count += 1;
+        } else {
+            self.others.push((row, column, value));
+        }
+    }
+
+    /// Makes the Taylor coefficients of the next power after `power`, given those of that; gives the largest of the components, and of all.
+    pub fn differentiate(&self, power: usize, last: &[f64], next: &mut [f64], room: f64) -> [f64; 2] {
+        if power == 0 {
+            next.copy_from_slice(&self.constants);
+        } else {
+            next.fill(0.0);
+        }
+        for input in &self.inputs {
+            next[input.row as usize] += input.powers.get(power).unwrap_or(&0.0);
+        }
+        for &(row, column, a) in &self.others {
+            next[row as usize] += a * last[column as usize];
+        }
+        let factor = room / (power + 1) as f64;
+        let (components, formulas) = next.split_at_mut(self.components);
+        let (rows, others) = self.rows.split_at(self.components);
+        let size = multiply(rows, last, factor, components);
+        [size, size.max(multiply(others, last, factor, formulas))]
+    }
+}
+
+/// Adds the products of rows and a vector to what is there, multiplies it by a factor, and gives the largest.
+fn multiply(rows: &[Row], x: &[f64], factor: f64, out: &mut [f64]) -> f64 {
+    // Numbers that are not negative have the order of their bits.
+    let mut largest = 0;
+    for (row, out) in out.iter_mut().enumerate() {
+        let Row { columns: [a, b, c], values: [of_a, of_b, of_c] } = &rows[row];
+        let sum = *out + of_a * x[*a as usize] + of_b * x[*b as usize] + of_c * x[*c as usize];
+        *out = factor * sum;
+        largest = largest.max(out.abs().to_bits());
+    }
+    f64::from_bits(largest)
+}
+
+/// The equations of a clause with numbers in place of programs, made when they are first asked for.
+fn known<'k>(clauses: &'k mut Clauses, rules: &[Rule], rule: usize, solve: usize) -> &'k LinearClause {
+    if clauses.len() <= rule {
+        clauses.resize(rules.len(), Vec::new());
+    }
+    let clauses = &mut clauses[rule];
+    if clauses.len() <= solve {
+        clauses.resize(rules[rule].solves.len(), None);
+    }
+    clauses[solve].get_or_insert_with(|| linear_clause(&rules[rule], solve))
+}
+
+fn linear_clause(rule: &Rule, solve: usize) -> LinearClause {
+    let clause = &rule.solves[solve];
+    let linear = clause.linear.as_ref()?;
+    let is_plain = rule.aggregates.is_empty() && clause.algebraic.is_empty();
+    if !is_plain || !linear.coefficients.reads().is_empty() {
+        return None;
+    }
+    let mut out = vec![0.0; linear.coefficients.outputs()];
+    // None of them is read.
+    let variables = vec![0.0; rule.variables + clause.switches.len()];
+    linear.coefficients.eval(&variables, &mut Vec::new(), &mut out);
+    let mut next = out.into_iter();
+    let equations = linear.variables.iter().zip(&clause.numeric).map(|(variables, &position)| {
+        let constant = next.next()?;
+        let reads = clause.stepping.reads(false);
+        let terms = variables.iter().map(|variable| {
+            let read = reads.iter().find(|read| read.variable == *variable)?;
+            Some((*read, next.next()?))
+        });
+        let terms: Option<Vec<(Read, f64)>> = terms.collect();
+        Some(LinearEquation { parameter: clause.of[position], constant, terms: terms? })
+    });
+    equations.collect()
+}
