@@ -39,6 +39,17 @@ fn an_organ_that_grows_from_nothing_keeps_its_width_between_the_samples_too() {
     }
 }
 
+/// A stem of a millimetre in a scene of a hundred metres.
+#[test]
+fn a_stem_keeps_its_thickness_however_thin_it_is() {
+    let model = "initial string: H(1) -(90) f(100) [ @L(1) ]\ninterpret H(x): !(0.0008) F(x)";
+    let session = Session::from_text("hair.dls", model, &[]).expect("a model");
+    let usd = Usd::read(&text(&follow(session, [0.0, 1.0, 0.5], 1)));
+    let near = usd.shown(0.5).into_values().flat_map(|shown| shown.vertices).filter(|p| p.x.abs() < 1.0);
+    let radii: Vec<f64> = near.map(|p| p.x.hypot(p.z)).filter(|r| *r > 0.0).collect();
+    assert!(radii.len() > 8 && radii.iter().all(|r| (r - 0.0004).abs() < 0.00001), "{radii:?}");
+}
+
 #[test]
 fn units_are_metres_and_seconds_and_names_are_identifiers() {
     let text_of = "title \"a 'reed' \u{1f33e} \\\\ é\"\nunits length 0.5, time 4\ninitial string: F(2) +(90) é-1(1)\nF(x): solve dx/dt = 1";

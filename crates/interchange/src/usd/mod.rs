@@ -65,9 +65,26 @@ pub(crate) fn file(growth: &Growth) -> Vec<u8> {
     writer.text.finish()
 }
 
+/// The part of its thickness that counts as accuracy for the points of a shape, of which the last decimal is a part; what is thinner than
+/// the second part of its length is flat.
+const OF_THICKNESS: f64 = 0.2;
+const FLAT: f64 = 1e-6;
+
 /// Decimals of points for an accuracy in metres.
 fn decimals(tolerance: f64) -> usize {
     (-(LAST_DECIMAL * tolerance).log10()).ceil().clamp(0.0, 300.0) as usize
+}
+
+/// Decimals of points with which a shape, between two corners at each of some ages, keeps its thickness when it is largest, however small
+/// that is beside the scene.
+fn fine_decimals(bounds: &[[[f32; 3]; 2]]) -> usize {
+    let sizes =
+        bounds.iter().map(|[least, most]| [0, 1, 2].map(|i| f64::from(most[i]) - f64::from(least[i])));
+    let longest = |sizes: &[f64; 3]| sizes.iter().copied().fold(0.0, f64::max);
+    let Some(sizes) = sizes.max_by(|a, b| longest(a).total_cmp(&longest(b))) else { return 0 };
+    let longest = longest(&sizes);
+    let thinnest = sizes.into_iter().filter(|size| *size > FLAT * longest).fold(longest, f64::min);
+    if thinnest > 0.0 { decimals(OF_THICKNESS * thinnest) } else { 0 }
 }
 
 /// The first lines of a layer, for a run between two times; codes in a second, and the last code.
@@ -172,10 +189,11 @@ impl Writer<'_> {
             |text| text.line("prepend apiSchemas = [\"MaterialBindingAPI\"]"),
             |text| {
                 text.line("uniform bool doubleSided = 1");
-                let bounds = points.values.iter().map(|points| bounds(points)).collect();
+                let bounds: Vec<_> = points.values.iter().map(|points| bounds(points)).collect();
+                let decimals = self.decimals.max(fine_decimals(&bounds));
                 let extent = Samples { ages: points.ages.clone(), values: bounds };
                 self.attribute(text, "float3[] extent", &extent, |out, corners| {
-                    tuples(out, corners, self.decimals);
+                    tuples(out, corners, decimals);
                 });
                 text.long("int[] faceVertexCounts = ", |out| {
                     list(out, &vec![3_u32; triangles.len() / 3], |out, n| push_number(out, n.into(), 0));
@@ -190,7 +208,7 @@ impl Writer<'_> {
                     text.line("interpolation = \"vertex\"")
                 });
                 self.attribute(text, "normal3f[] normals", normals, |out, all| tuples(out, all, OF_NORMALS));
-                self.attribute(text, "point3f[] points", points, |out, all| tuples(out, all, self.decimals));
+                self.attribute(text, "point3f[] points", points, |out, all| tuples(out, all, decimals));
                 if let Some(color) = color {
                     text.long("color3f[] primvars:displayColor = ", |out| {
                         list(out, &[rgb(color)], |out, rgb| tuple(out, rgb, OF_COLORS));

@@ -25,6 +25,7 @@ pub mod linear;
 mod matrix;
 mod meeting;
 mod newton;
+mod polynomial_step;
 pub mod reintegration;
 mod repair;
 mod restart;

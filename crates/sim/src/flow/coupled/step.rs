@@ -1,5 +1,6 @@
 //! The common step of the coupled modules, and the search for the next event of each member.
 
+use crate::Scheduler;
 use crate::detect::crossing::needs_search;
 use crate::detect::examined::{Conditions, ExaminedStep, Stages};
 use crate::detect::pulse::{MAX_UNBOUNDED, PulseFinding};
@@ -14,17 +15,15 @@ use crate::flow::coupled::equations::Equations;
 use crate::flow::coupled::meeting::Meeting;
 use crate::flow::coupled::sift::Outcome;
 use crate::flow::coupled::system::{Membership, System};
-use crate::flow::coupled::taylor::Members;
 use crate::flow::coupled::traffic::Work;
 use crate::flow::independent::crawls;
-use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, StepError, StepRequest};
+use crate::flow::integrator::{StepError, StepRequest};
 use crate::schedule::Owner;
 use crate::world::World;
 use crate::world::coupled_solution::CoupledSolution;
 use crate::world::path::Path;
 use crate::world::prefetch::prefetch;
 use crate::world::state::NextKind;
-use crate::{Method, Scheduler};
 use dlsys_model::Rule;
 use dlsys_tree::{ModuleId, SimTime};
 
@@ -33,14 +32,6 @@ const MAX_TRIES: usize = 100;
 
 /// The part of a common step's length that is tried where too many members would have to be integrated again.
 const SHORTER: f64 = 0.25;
-
-/// Polynomials of linear equations serve as a common step if they lead to this part of what a step of a pair would, or to its limit;
-/// a reach smaller by more than the second factor is not tried again. The third is that by which longer ones of a pair are expected.
-const ENOUGH: f64 = 0.5;
-const FAR: f64 = 2.0;
-const LONGER: f64 = 1.03;
-/// The reach, as a part of what is wanted, where there are no polynomials.
-const SHORT: f64 = 0.1;
 
 /// A common step: its end, and its dense output if that has been computed.
 type CommonStep = (Result<SimTime, StepFailure>, Option<CoupledSolution>);
@@ -128,61 +119,8 @@ impl FlowStage<'_, '_> {
         Ok(())
     }
 
-    /// Makes a step of linear equations as polynomials, where that leads as far as a step of a pair would; false if it does not.
-    pub(super) fn step_by_powers(&mut self, from: SimTime) -> bool {
-        let settings = &self.setup.settings;
-        let is_explicit = settings.method == Method::Auto && !self.flows.coupled.control.stiff;
-        // Without conditions there are no steps at all.
-        let is_searched = self.setup.has_conditions && !self.setup.has_pulses;
-        if !is_explicit
-            || settings.scheduler != Scheduler::Auto
-            || !is_searched
-            || self.may_go_without_steps()
-        {
-            return false;
-        }
-        let Coupled { traffic, members, reintegration, control, y, reach, .. } = &mut self.flows.coupled;
-        let limits = [traffic.begin(from, members.len(), None), self.world.resolved(from)];
-        let limit = limits.into_iter().flatten().reduce(|a, b| if b < a { b } else { a });
-        // What fell short of a step by far the last time does so again.
-        let wanted = limit.map_or(control.size, |limit| limit.since(from).min(control.size));
-        if y.is_empty() || ENOUGH * wanted > FAR * *reach && *reach > 0.0 {
-            *reach *= LONGER;
-            return false;
-        }
-        let tolerance = INNER_TOLERANCE * self.setup.coupled_settings.tolerance;
-        let all = Members { world: self.world, rules: &self.setup.model.rules, members, numbers: None };
-        let Some(mut dense) = reintegration.taylor.step(all, (y, from), limit, tolerance) else {
-            *reach = SHORT * wanted;
-            return false;
-        };
-        *reach = dense.h;
-        if ENOUGH * wanted > dense.h {
-            return false;
-        }
-        // Steps of a pair are tried where polynomials end long before anything else does.
-        if limit.is_none_or(|limit| limit != dense.end) {
-            control.size = dense.h.max(LONGER * control.size);
-        }
-        control.error = (control.error + dense.error).min(CERTAINTY * self.setup.coupled_settings.tolerance);
-        dense.error = control.error;
-        self.log.stats.steps += 1;
-        let end = dense.end;
-        let Coupled { system, integrator, linear, tried, reintegrated, .. } = &mut self.flows.coupled;
-        system.sections.clear();
-        (*tried, *linear) = (false, None);
-        integrator.set_unwatched(false);
-        integrator.keep_reached(false);
-        // The next step begins with the values at the end of this one, which no integrator knows.
-        *reintegrated = true;
-        self.world.coupled = Some(CoupledSolution::new(dense));
-        self.search_all(from);
-        self.schedule.schedule(Owner::Coupled, end);
-        true
-    }
-
     /// Finds the next events of all members before the end of the common step.
-    fn search_all(&mut self, from: SimTime) {
+    pub(super) fn search_all(&mut self, from: SimTime) {
         let members = std::mem::take(&mut self.flows.coupled.members);
         self.search_members(&members, from);
         self.flows.coupled.members = members;
