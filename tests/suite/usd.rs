@@ -28,7 +28,9 @@ fn an_organ_that_grows_from_nothing_keeps_its_width_between_the_samples_too() {
     for drawing in
         ["!(0.2) F(x) @L(x)", "!(0.2) F(x)", "{ F(x) +(90) F(0.3) +(100) F(x*x) }", "!(0.1*x) F(1) @O(0.5)"]
     {
-        let text = format!("initial string: B(0.0001)\nB(x): solve dx/dt = 1\ninterpret B(x): {drawing}");
+        let text = format!(
+            "initial string: for i in 1 .. 8: ( B(0.0001) f(4) )\nB(x): solve dx/dt = 1\ninterpret B(x): {drawing}"
+        );
         let session = Session::from_text("wide.dls", &text, &[]).expect("a model");
         let followed = follow(session, [0.0, 3.0, 0.1], 1);
         let usd = Usd::read(&self::text(&followed));
@@ -47,7 +49,9 @@ fn a_stem_keeps_its_thickness_however_thin_it_is() {
     let usd = Usd::read(&text(&follow(session, [0.0, 1.0, 0.5], 1)));
     let near = usd.shown(0.5).into_values().flat_map(|shown| shown.vertices).filter(|p| p.x.abs() < 1.0);
     let radii: Vec<f64> = near.map(|p| p.x.hypot(p.z)).filter(|r| *r > 0.0).collect();
-    assert!(radii.len() > 8 && radii.iter().all(|r| (r - 0.0004).abs() < 0.00001), "{radii:?}");
+    // Its ends are round.
+    let widest = radii.iter().copied().fold(0.0, f64::max);
+    assert!(radii.len() > 8 && (widest - 0.0004).abs() < 0.00001, "{radii:?}");
 }
 
 #[test]

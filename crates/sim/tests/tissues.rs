@@ -120,8 +120,7 @@ fn linear_tissue(
     (kind, guard): (usize, usize),
     cells: &[(f64, f64)],
 ) -> String {
-    let successor =
-        ["F_v(0, 0.5*c + 60)", "F_v(0.05, c) F_v(0.37, 0.9*c)", "F_v(0.1, 0.8*c) F_h(1, c)"][kind % 3];
+    let successor = ["F_v(0, 0.5*c + 60)", "F_v(0.05, c) F_v(0.37, c)", "F_v(0.1, c) F_h(1, c)"][kind % 3];
     let (held, met) = [
         ("", ""),
         (" & c > 40", "  if c = 40 produce F_h(x, c)\n"),
@@ -139,7 +138,7 @@ fn linear_tissue(
 }
 
 proptest::proptest! {
-    #![proptest_config(proptest::prelude::ProptestConfig { cases: 40, ..Default::default() })]
+    #![proptest_config(proptest::prelude::ProptestConfig { cases: 150, ..Default::default() })]
 
     /// Linear equations are followed by polynomials, and by steps of pairs where those lead too short a way: both against global steps.
     #[test]
