@@ -385,6 +385,9 @@ fn failure(run: &ModelRun, error: &interchange::Error) -> Failure {
             "without `--topology varying` shapes are shared by modules, and the file is much smaller",
         ],
         Error::TooLong { .. } => &[&a_minute],
+        Error::TooFar { .. } => &[
+            "let the plant stand nearer to the origin, or write USD, which keeps all digits: `--format usda`",
+        ],
         Error::GroundTooFar { .. } => &["a ground at the foot of the plants, as in `ground 0`"],
         Error::TooWide { .. } => &["a shorter unit, `units length 1e-30`, or an earlier end, `--to T`"],
         _ => &[],

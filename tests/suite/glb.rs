@@ -163,6 +163,26 @@ fn positions_are_within_the_accuracy_between_frames_too() {
     check_positions(&RUNS, worst);
 }
 
+/// Places in a GLB file have 32 bits.
+#[test]
+fn what_stands_too_far_from_the_origin_for_its_size_is_an_error() {
+    let file = |far: &str| {
+        let text =
+            format!("initial string: f({far}) B(0.1)\nB(x): solve dx/dt = 1\ninterpret B(x): F(x) @L(x)");
+        let session = Session::from_text("far.dls", &text, &[]).expect("a model");
+        let growth = follow(session, [0.0, 2.0, 0.5], 1).growth;
+        (growth.file(Format::Glb).map_err(|error| error.to_string()), growth.file(Format::Usda).is_ok())
+    };
+    assert!(file("1000").0.is_ok());
+    let (glb, usd) = file("10000000");
+    let message = glb.expect_err("refused");
+    assert!(
+        message.contains("1.000e7 m from the origin") && message.contains("off by 6.0e-1 m"),
+        "{message}"
+    );
+    assert!(usd);
+}
+
 /// Whole runs of the models, at many times; those with stems that sway and with things that fall have tests of their own.
 #[test]
 #[ignore = "slow"]

@@ -72,6 +72,16 @@ pub enum Error {
         /// The largest that it may be.
         limit: f64,
     },
+    /// Something stands so far from the origin that its places in the file, of 32 bits, are further off than the accuracy allows.
+    #[error(
+        "something is drawn {metres:.3e} m from the origin, where places in the file are off by {off:.1e} m: more than the accuracy allows"
+    )]
+    TooFar {
+        /// The distance in metres.
+        metres: f64,
+        /// Half of the distance of two numbers there.
+        off: f64,
+    },
     /// The same of the ground.
     #[error("the ground is at a height of {metres:e} m, and places in the file go up to {limit:e} m")]
     GroundTooFar {

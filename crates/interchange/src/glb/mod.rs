@@ -42,6 +42,8 @@ struct Writer<'a> {
     materials: HashMap<Option<MaterialId>, usize>,
     /// Numbers of the meshes of stems, by contour, whether they have a neck, corners and material.
     stems: BTreeMap<(Option<u32>, bool, usize, MaterialId), usize>,
+    /// The largest coordinate of a node, in metres.
+    farthest: f64,
 }
 
 /// The bytes of the file of a run.
@@ -54,9 +56,15 @@ pub(crate) fn file(growth: &Growth) -> Result<Vec<u8>, Error> {
         document: Document::default(),
         materials: HashMap::new(),
         stems: BTreeMap::new(),
+        farthest: 0.0,
     };
     writer.asset();
     writer.nodes();
+    // Rounding moves a place by half of the distance between two numbers.
+    let (metres, off) = (writer.farthest, 0.5 * f64::from(f32::EPSILON) * writer.farthest);
+    if off > growth.options.tolerance() {
+        return Err(Error::TooFar { metres, off });
+    }
     writer.finish()
 }
 
@@ -105,8 +113,9 @@ impl Writer<'_> {
             node.extras = Some(extras);
             let tolerance = 0.13 * growth.options.tolerance();
             let moved = Moved { phase, life, clock: &self.clock, tolerance };
-            let buffer = &mut self.buffer;
-            let tracks = motion::Tracks { target, node: &mut node, animation: &mut animation, buffer };
+            let (buffer, farthest) = (&mut self.buffer, &mut self.farthest);
+            let (place, moves) = (&mut node, &mut animation);
+            let tracks = motion::Tracks { target, node: place, animation: moves, buffer, farthest };
             if tracks.write(&moved) {
                 self.document.nodes[0].children.push(target);
                 self.document.nodes.push(node);
@@ -126,6 +135,7 @@ impl Writer<'_> {
         let meshes: Vec<usize> = growth.stands.looks.iter().map(|look| self.look(look)).collect();
         for stand in &growth.stands.stands {
             let kind = plain_name(&stand.kind);
+            self.farthest = self.farthest.max(stand.frame.origin.coords.amax());
             let translation: [f32; 3] = stand.frame.origin.coords.map(|x| x as f32).into();
             let rotation: [f32; 4] = stand.frame.turn.coords.map(|x| x as f32).into();
             let scale = stand.scales.map(|x| x as f32);

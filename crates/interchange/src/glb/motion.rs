@@ -14,6 +14,8 @@ pub(super) struct Tracks<'a> {
     pub(super) node: &'a mut Node,
     pub(super) animation: &'a mut Animation,
     pub(super) buffer: &'a mut Buffer,
+    /// The largest coordinate of a node so far, in metres.
+    pub(super) farthest: &'a mut f64,
 }
 
 impl Tracks<'_> {
@@ -34,6 +36,8 @@ impl Tracks<'_> {
     /// Translation and rotation, with keys in common.
     fn place(&mut self, moved: &Moved<'_>) {
         let path = moved.path();
+        let far = path.frames.iter().map(|frame| frame.origin.coords.amax());
+        *self.farthest = far.fold(*self.farthest, f64::max);
         let places: Vec<[f32; 3]> =
             path.frames.iter().map(|frame| frame.origin.coords.map(|x| x as f32).into()).collect();
         let mut turns: Vec<[f32; 4]> = Vec::with_capacity(path.frames.len());
