@@ -114,26 +114,35 @@ fn events_met_by_formulas_leave_stiff_linear_tissues_without_steps() {
 }
 
 /// A tissue with linear equations: cells that divide or turn into others by their clocks and by what diffuses, beside some whose content
-/// is a formula.
+/// is a formula; with a conductance that each cell has of its own, or one for all.
 fn linear_tissue(
     (d, flow, decay): (f64, f64, f64),
-    (kind, guard): (usize, usize),
+    (kind, guard, has_own): (usize, usize, bool),
     cells: &[(f64, f64)],
 ) -> String {
-    let successor = ["F_v(0, 0.5*c + 60)", "F_v(0.05, c) F_v(0.37, c)", "F_v(0.1, c) F_h(1, c)"][kind % 3];
+    let [w, of_one, of_left, own, by] =
+        if has_own { [", w", ", 1", ", u", "(0.5*u + w)*", ", v"] } else { ["", "", "", "", ""] };
+    let successor = [
+        format!("F_v(0, 0.5*c + 60{w})"),
+        format!("F_v(0.05, c{w}) F_v(0.37, c{w})"),
+        format!("F_v(0.1, c{w}) F_h(1, c{w})"),
+    ];
     let (held, met) = [
-        ("", ""),
-        (" & c > 40", "  if c = 40 produce F_h(x, c)\n"),
-        (" & c < 170", "  if c = 170 produce F_v(0.5*x, 100)\n"),
-    ][guard % 3];
-    let formula = ["0.15*(255 - c)", "-0.4*c", "3", "0"][(kind + guard) % 4];
-    let cells: String = cells.iter().map(|(x, c)| format!("F_v({x}, {c}) ")).collect();
+        ("", String::new()),
+        (" & c > 40", format!("  if c = 40 produce F_h(x, c{w})\n")),
+        (" & c < 170", format!("  if c = 170 produce F_v(0.5*x, 100{w})\n")),
+    ][guard % 3]
+        .clone();
+    let (successor, formula) =
+        (&successor[kind % 3], ["0.15*(255 - c)", "-0.4*c", "3", "0"][(kind + guard) % 4]);
+    let width = |x: &f64| if has_own { format!(", {}", 0.3 + x) } else { String::new() };
+    let cells: String = cells.iter().map(|(x, c)| format!("F_v({x}, {c}{}) ", width(x))).collect();
     format!(
-        "initial string: F_h(1, 255) {cells} F_h(0.5, 90) {cells} F_h(1, 200)\n\
-         F(y, l) < F_v(x, c) > F(z, r):\n  \
-         if x < 1{held} solve dx/dt = 0.1 + 0.5*x, dc/dt = {d}*(l + r - 2c) + {flow}*(l - c) - {decay}*c\n  \
+        "initial string: F_h(1, 255{of_one}) {cells} F_h(0.5, 90{of_one}) {cells} F_h(1, 200{of_one})\n\
+         F(y, l{of_left}) < F_v(x, c{w}) > F(z, r{by}):\n  \
+         if x < 1{held} solve dx/dt = 0.1 + 0.5*x, dc/dt = {d}*{own}(l + r - 2c) + {flow}*(l - c) - {decay}*c\n  \
          if x = 1{held} produce {successor}\n{met}\
-         F_h(x, c): solve dx/dt = 0.1*(1 - x), dc/dt = {formula}\n"
+         F_h(x, c{w}): solve dx/dt = 0.1*(1 - x), dc/dt = {formula}\n"
     )
 }
 
@@ -144,7 +153,7 @@ proptest::proptest! {
     #[test]
     fn linear_tissues_have_the_events_and_values_of_global_steps(
         (d, flow, decay) in (-2.0..1.5f64, 0.0..1.0f64, 0.0..0.3f64),
-        choice in (0..3usize, 0..3usize),
+        choice in (0..3usize, 0..3usize, proptest::bool::ANY),
         cells in proptest::collection::vec((0.0..0.95f64, 60.0..140.0f64), 3..14),
     ) {
         let d = 10f64.powf(d);
@@ -172,9 +181,13 @@ fn readers_without_equations_have_events_beside_one_that_is_integrated() {
 /// Polynomials take no trials, and what is observed changes nothing.
 #[test]
 fn a_linear_tissue_with_events_rejects_no_step() {
+    [false, true].map(rejects_no_step);
+}
+
+fn rejects_no_step(has_own: bool) {
     let cells: Vec<(f64, f64)> =
         (0..40).map(|n| (f64::from(n) * 0.618 % 0.95, 60.0 + f64::from(n * 37 % 80))).collect();
-    let text = linear_tissue((0.03, 0.0, 0.03), (1, 1), &cells);
+    let text = linear_tissue((0.03, 0.0, 0.03), (1, 1, has_own), &cells);
     let run = |settings: Settings, times: &[f64]| {
         let session = Session::from_text("tissue.dls", &text, &[]).expect("a model");
         let mut simulation = session.simulate(settings).expect("it starts");

@@ -6,9 +6,11 @@ use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::prefetch::prefetch;
 use crate::world::state::State;
+use dlsys_expr::Scratch;
 use dlsys_model::{Read, Rule};
 use dlsys_ode::MAX_DEGREE;
 use dlsys_tree::{ModuleId, SimTime};
+use std::ops::Range;
 
 /// A formula is looked for among so many that were met last: neighbours in the string read the same.
 const RECENT: usize = 4;
@@ -23,8 +25,19 @@ pub struct LinearEquation {
     terms: Vec<(Read, f64)>,
 }
 
-/// Those of a clause; None if they are not linear with coefficients that depend on nothing.
-pub type LinearClause = Option<Box<[LinearEquation]>>;
+/// What coefficients of a module are made of: the number of the variable, and where its value is found.
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    Parameter(Read),
+    Switch(usize, usize),
+}
+
+/// The equations of a clause, and what their coefficients depend on, besides the clause.
+#[derive(Clone, Debug)]
+pub struct LinearClause {
+    equations: Box<[LinearEquation]>,
+    sources: Box<[Source]>,
+}
 
 /// A component outside the region that a row reads.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +66,15 @@ pub struct Members<'r> {
     pub numbers: Option<&'r Numbers>,
 }
 
-impl Members<'_> {
+impl<'r> Members<'r> {
+    /// The module that one reads, and its state.
+    fn module(&self, state: &'r State, read: Read) -> (ModuleId, Option<&'r State>) {
+        match read.neighbour.map(|n| state.context.context()[n]) {
+            None => (state.id, Some(state)),
+            Some(module) => (module, self.world.state(module)),
+        }
+    }
+
     fn number(&self, component: u32) -> Option<u32> {
         match self.numbers {
             Some(numbers) => numbers.of(component),
@@ -63,7 +84,7 @@ impl Members<'_> {
 }
 
 /// What is known of clauses, by rule and clause.
-pub type Clauses = Vec<Vec<Option<LinearClause>>>;
+pub type Clauses = Vec<Vec<Option<Option<LinearClause>>>>;
 
 /// The rows of A, those of closed forms last, and what else is in the equations.
 #[derive(Clone, Debug, Default)]
@@ -78,6 +99,10 @@ pub struct Rows {
     formulas: Vec<(usize, u32)>,
     /// Decay and inflow of the rows of closed forms; no inflow where the next one flows in.
     links: Vec<(f64, Option<f64>)>,
+    /// The variables of a module, its coefficients, and registers.
+    variables: Vec<f64>,
+    coefficients: Vec<f64>,
+    scratch: Scratch<f64>,
     /// The values of all rows: at first those at the start.
     pub y: Vec<f64>,
     /// The number of components, whose rows come first.
@@ -114,8 +139,16 @@ impl Rows {
             if state.numeric_only {
                 return None;
             }
-            for equation in known(clauses, rules, rule, solve).as_ref()?.iter() {
-                self.push(all, state, equation, now)?;
+            let clause = known(clauses, rules, rule, solve).as_ref()?;
+            let own = !clause.sources.is_empty();
+            if own {
+                self.evaluate(all, state, clause, (&rules[rule], solve))?;
+            }
+            let mut first = 0;
+            for equation in &clause.equations {
+                let count = 1 + equation.terms.len();
+                self.push(all, state, equation, own.then_some(first..first + count), now)?;
+                first += count;
             }
         }
         for n in 0..self.links.len() {
@@ -138,22 +171,59 @@ impl Rows {
         self.norm.is_finite().then_some(())
     }
 
-    /// Adds the row of an equation of a module.
+    /// Evaluates the coefficients of a module; None if they read what moves.
+    fn evaluate(
+        &mut self,
+        all: Members,
+        state: &State,
+        clause: &LinearClause,
+        (rule, solve): (&Rule, usize),
+    ) -> Option<()> {
+        self.variables.clear();
+        self.variables.resize(rule.variables + state.switches.len(), 0.0);
+        for source in &clause.sources {
+            match *source {
+                Source::Parameter(read) => {
+                    let (module, moves) = all.module(state, read);
+                    let trajectory = moves.and_then(|state| state.trajectories.get(read.parameter));
+                    if !matches!(trajectory, None | Some(Trajectory::Rest)) {
+                        return None;
+                    }
+                    self.variables[read.variable] = all.world.tree.parameters(module)[read.parameter];
+                }
+                Source::Switch(variable, switch) => {
+                    self.variables[variable] = f64::from(u8::from(state.switches[switch]));
+                }
+            }
+        }
+        let program = &rule.solves[solve].linear.as_ref()?.coefficients;
+        self.coefficients.resize(program.outputs(), 0.0);
+        program.eval(&self.variables, &mut self.scratch, &mut self.coefficients);
+        Some(())
+    }
+
+    /// Adds the row of an equation of a module, with coefficients of its own from some places on if it has such.
     #[inline]
-    fn push(&mut self, all: Members, state: &State, equation: &LinearEquation, now: SimTime) -> Option<()> {
+    fn push(
+        &mut self,
+        all: Members,
+        state: &State,
+        equation: &LinearEquation,
+        own: Option<Range<usize>>,
+        now: SimTime,
+    ) -> Option<()> {
         let world = all.world;
-        let (row, mut count) = (self.begin(equation.constant), 0);
+        let constant = own.as_ref().map_or(equation.constant, |own| self.coefficients[own.start]);
+        let (row, mut count) = (self.begin(constant), 0);
         let Trajectory::Coupled(component) = *state.trajectories.get(equation.parameter)? else {
             return None;
         };
         if all.number(component) != Some(row) {
             return None;
         }
-        for &(read, coefficient) in &equation.terms {
-            let (module, moves) = match read.neighbour.map(|n| state.context.context()[n]) {
-                None => (state.id, Some(state)),
-                Some(module) => (module, world.state(module)),
-            };
+        for (n, &(read, coefficient)) in equation.terms.iter().enumerate() {
+            let coefficient = own.as_ref().map_or(coefficient, |own| self.coefficients[own.start + 1 + n]);
+            let (module, moves) = all.module(state, read);
             let place = || world.tree.places(module).start + read.parameter;
             let moves = moves.and_then(|state| Some((state, state.trajectories.get(read.parameter)?)));
             match moves {
@@ -243,8 +313,14 @@ fn multiply(rows: &[Row], x: &[f64], factor: f64, out: &mut [f64]) -> f64 {
     f64::from_bits(largest)
 }
 
-/// The equations of a clause with numbers in place of programs, made when they are first asked for.
-fn known<'k>(clauses: &'k mut Clauses, rules: &[Rule], rule: usize, solve: usize) -> &'k LinearClause {
+/// The equations of a clause with numbers in place of programs, made when they are first asked for; None if they are not linear with
+/// constant coefficients.
+fn known<'k>(
+    clauses: &'k mut Clauses,
+    rules: &[Rule],
+    rule: usize,
+    solve: usize,
+) -> &'k Option<LinearClause> {
     if clauses.len() <= rule {
         clauses.resize(rules.len(), Vec::new());
     }
@@ -255,27 +331,31 @@ fn known<'k>(clauses: &'k mut Clauses, rules: &[Rule], rule: usize, solve: usize
     clauses[solve].get_or_insert_with(|| linear_clause(&rules[rule], solve))
 }
 
-fn linear_clause(rule: &Rule, solve: usize) -> LinearClause {
+fn linear_clause(rule: &Rule, solve: usize) -> Option<LinearClause> {
     let clause = &rule.solves[solve];
     let linear = clause.linear.as_ref()?;
-    let is_plain = rule.aggregates.is_empty() && clause.algebraic.is_empty();
-    if !is_plain || !linear.coefficients.reads().is_empty() {
+    if !rule.aggregates.is_empty() || !clause.algebraic.is_empty() {
         return None;
     }
+    let reads = clause.stepping.reads(false);
+    let read_of = |variable: usize| reads.iter().find(|read| read.variable == variable).copied();
+    let sources =
+        linear.coefficients.reads().iter().map(|&variable| match variable.checked_sub(rule.variables) {
+            Some(switch) => Some(Source::Switch(variable, switch)),
+            None => read_of(variable).map(Source::Parameter),
+        });
+    let sources: Option<Box<[Source]>> = sources.collect();
     let mut out = vec![0.0; linear.coefficients.outputs()];
-    // None of them is read.
+    // If any of them is read, each module has coefficients of its own.
     let variables = vec![0.0; rule.variables + clause.switches.len()];
     linear.coefficients.eval(&variables, &mut Vec::new(), &mut out);
     let mut next = out.into_iter();
     let equations = linear.variables.iter().zip(&clause.numeric).map(|(variables, &position)| {
         let constant = next.next()?;
-        let reads = clause.stepping.reads(false);
-        let terms = variables.iter().map(|variable| {
-            let read = reads.iter().find(|read| read.variable == *variable)?;
-            Some((*read, next.next()?))
-        });
-        let terms: Option<Vec<(Read, f64)>> = terms.collect();
+        let terms: Option<Vec<(Read, f64)>> =
+            variables.iter().map(|variable| Some((read_of(*variable)?, next.next()?))).collect();
         Some(LinearEquation { parameter: clause.of[position], constant, terms: terms? })
     });
-    equations.collect()
+    let equations: Option<Box<[LinearEquation]>> = equations.collect();
+    Some(LinearClause { equations: equations?, sources: sources? })
 }
