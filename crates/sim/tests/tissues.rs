@@ -181,7 +181,7 @@ fn readers_without_equations_have_events_beside_one_that_is_integrated() {
 /// Polynomials take no trials, and what is observed changes nothing.
 #[test]
 fn a_linear_tissue_with_events_rejects_no_step() {
-    [false, true].map(rejects_no_step);
+    [false, true].into_iter().for_each(rejects_no_step);
 }
 
 fn rejects_no_step(has_own: bool) {
