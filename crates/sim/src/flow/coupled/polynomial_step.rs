@@ -5,7 +5,7 @@
 
 use crate::flow::FlowStage;
 use crate::flow::coupled::Coupled;
-use crate::flow::coupled::taylor::Members;
+use crate::flow::coupled::taylor::{LOOSEST, Members};
 use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE};
 use crate::schedule::Owner;
 use crate::world::coupled_solution::CoupledSolution;
@@ -26,7 +26,8 @@ impl FlowStage<'_, '_> {
         let settings = &self.setup.settings;
         let is_explicit = settings.method == Method::Auto && !self.flows.coupled.control.stiff;
         // Without conditions there are no steps at all.
-        let is_searched = self.setup.has_conditions && !self.setup.has_pulses;
+        let is_searched =
+            self.setup.has_conditions && !self.setup.has_pulses && settings.tolerance <= LOOSEST;
         if !is_explicit
             || settings.scheduler != Scheduler::Auto
             || !is_searched

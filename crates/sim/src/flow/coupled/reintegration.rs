@@ -31,7 +31,7 @@ use crate::flow::FlowStage;
 use crate::flow::coupled::columns::{Numbers, Whole};
 use crate::flow::coupled::equations::{Equations, RateWorkspace};
 use crate::flow::coupled::system::{Membership, System, integrated};
-use crate::flow::coupled::taylor::{Members, Taylor};
+use crate::flow::coupled::taylor::{LOOSEST, Members, Taylor};
 use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator, StepRequest};
 use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
@@ -403,7 +403,7 @@ impl FlowStage<'_, '_> {
         // The neglected change at the edge of the region adds to the error.
         control.error = self.flows.coupled.control.error + tolerance;
         let is_explicit = stiff.is_none() && !control.stiff && !frozen;
-        let is_auto = self.setup.settings.method == Method::Auto;
+        let is_auto = self.setup.settings.method == Method::Auto && self.setup.settings.tolerance <= LOOSEST;
         if is_explicit && is_auto && !self.setup.has_pulses {
             let world = &*self.world;
             let members = Members { world, rules, members: &region.members, numbers: Some(numbers) };

@@ -25,6 +25,8 @@ const SHARE: f64 = 0.1;
 const ROUNDING: f64 = 1e-14;
 /// The part of that which the powers that are left out may have: the error of the end, which is carried on.
 const TAIL: f64 = 0.01;
+/// Above this tolerance, as steps of pairs are, they are of low order and short: what is within the error of a level is told apart sooner.
+pub const LOOSEST: f64 = 1e-4;
 /// The part of the length that the bound allows which is taken.
 const SAFETY: f64 = 0.9;
 /// The longest piece, in units of the inverse of the norm: terms of alternating sign lose no more than three digits.
@@ -35,6 +37,10 @@ const FIRST: f64 = 0.25;
 const GROWTH: f64 = 4.0;
 /// The same where the error ended the last one: what is tried in vain takes more powers.
 const GAIN: f64 = 1.2;
+/// A common step in which a component falls below this part of what it was is cut into halves, up to so many times: its error is taken to be
+/// relative to the largest value within a step.
+const LEFT: f64 = 0.5;
+const MOST_HALVINGS: usize = 3;
 /// More pieces than this up to the end of the common step take longer than steps of a pair.
 const MOST_PIECES: usize = 8;
 /// The memory of smaller systems is kept: it stays in the caches.
@@ -120,8 +126,16 @@ impl Taylor {
             return None;
         }
         let end = limit.filter(|limit| limit.since(far) < 0.0).unwrap_or(far);
-        let dense =
-            self.piece(Span { from: now, end: Some(end), solution: None, tolerance: share(tolerance) });
+        let mut span = Span { from: now, end: Some(end), solution: None, tolerance: share(tolerance) };
+        let mut dense = self.piece(span);
+        for _ in 0..MOST_HALVINGS {
+            let Some(found) = dense.as_ref().filter(|dense| falls(dense)) else { break };
+            span.end = Some(now.after(0.5 * found.h));
+            // The first coefficients are the values at the start.
+            let n = self.rows.y.len();
+            self.rows.y.copy_from_slice(&self.powers[..n]);
+            dense = self.piece(span);
+        }
         if let Some(dense) = &dense {
             self.next = dense.h * if dense.end == end { GROWTH } else { GAIN };
         }
@@ -254,6 +268,14 @@ impl Taylor {
             self.rows.y[..self.rows.components].iter().zip(rates).map(|(y, a)| y.abs().max(a.abs() / parts));
         scales.fold(f64::INFINITY, f64::min)
     }
+}
+
+/// True if some component falls by much.
+fn falls(dense: &Dense) -> bool {
+    (0..dense.components()).any(|component| match dense.of(component) {
+        [first, .., last] => last.abs() < LEFT * first.abs(),
+        _ => false,
+    })
 }
 
 /// The part of what is tolerated of a step that a piece may have.
