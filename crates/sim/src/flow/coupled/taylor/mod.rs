@@ -25,7 +25,7 @@ const SHARE: f64 = 0.1;
 const ROUNDING: f64 = 1e-14;
 /// The part of that which the powers that are left out may have: the error of the end, which is carried on.
 const TAIL: f64 = 0.01;
-/// Above this tolerance, as steps of pairs are, they are of low order and short: what is within the error of a level is told apart sooner.
+/// Polynomials serve up to this tolerance. Above it, `auto` has short steps of low order, in which fewer approaches to a level are in doubt.
 pub const LOOSEST: f64 = 1e-4;
 /// The part of the length that the bound allows which is taken.
 const SAFETY: f64 = 0.9;
