@@ -167,19 +167,52 @@ impl Dense {
         Dense { error: self.error, ..Dense::new(start, Some(end), h, MAX_DEGREE, all) }
     }
 
+    /// The rest of a step of one component, from a position below 1 on; its start is to be at this time, with this value.
+    pub fn rest(&self, position: f64, start: SimTime, value: f64) -> Dense {
+        let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
+        let coefficients = &mut c[..=self.degree];
+        coefficients.copy_from_slice(self.of(0));
+        cut(coefficients, position, 1.0);
+        coefficients[0] = value;
+        let h = (1.0 - position) * self.h;
+        Dense { error: self.error, ..Dense::new(start, None, h, self.degree, coefficients.to_vec()) }
+    }
+
+    /// The position at which a component, which rises or falls all along, has a value that lies between its ends.
+    pub fn position_of(&self, component: usize, value: f64) -> f64 {
+        let c = self.of(component);
+        let [first, last] = [c[0], c[self.degree]];
+        let [mut lo, mut hi] = [0.0, 1.0];
+        let mut position = (value - first) / (last - first);
+        for _ in 0..64 {
+            let here = self.departure(component, position);
+            let gap = value - here.value;
+            if gap == 0.0 {
+                break;
+            }
+            match (gap > 0.0) == (last > first) {
+                true => lo = position,
+                false => hi = position,
+            }
+            let next = position + gap / here.rate;
+            let next = if next > lo && next < hi { next } else { 0.5 * (lo + hi) };
+            if (next - position).abs() <= f64::EPSILON {
+                break;
+            }
+            position = next;
+        }
+        position
+    }
+
     /// One component at a position, and its rate there, per unit of position.
     pub fn departure(&self, component: usize, position: f64) -> Dual<f64> {
         let mut c: Coefficients = [0.0; MAX_DEGREE + 1];
         c[..=self.degree].copy_from_slice(self.of(component));
-        if self.degree == 0 {
-            return Dual { value: c[0], rate: 0.0 };
+        // The degree of most steps has code without loops.
+        match self.degree {
+            MAX_DEGREE => departure(&mut c, position),
+            degree => departure(&mut c[..=degree], position),
         }
-        for level in (2..=self.degree).rev() {
-            for i in 0..level {
-                c[i] = mix(c[i], c[i + 1], position);
-            }
-        }
-        Dual { value: mix(c[0], c[1], position), rate: self.degree as f64 * (c[1] - c[0]) }
     }
 
     /// The value of one component and its rate, per unit of position, at [`PLACE`]; fast for polynomials of degree 7.
@@ -251,6 +284,21 @@ fn bounds_between(c: &mut [f64], lo: f64, hi: f64) -> Dual<Interval> {
         rate = hull(&slopes[..degree]);
     }
     Dual { value: hull(c), rate }
+}
+
+/// The value of a polynomial with these coefficients, which it takes, and its rate.
+#[inline(always)]
+fn departure(c: &mut [f64], position: f64) -> Dual<f64> {
+    let degree = c.len() - 1;
+    if degree == 0 {
+        return Dual { value: c[0], rate: 0.0 };
+    }
+    for level in (2..=degree).rev() {
+        for i in 0..level {
+            c[i] = mix(c[i], c[i + 1], position);
+        }
+    }
+    Dual { value: mix(c[0], c[1], position), rate: degree as f64 * (c[1] - c[0]) }
 }
 
 /// Restricts a polynomial to the positions from `lo` to `hi` (de Casteljau's subdivision, at `hi` and then at `lo`).
@@ -352,6 +400,24 @@ mod tests {
             let lo = a * (1.0 - w);
             let value = dense.powers(0, lo, lo + w).iter().rev().fold(0.0, |sum, c| sum * s + c);
             prop_assert!((value - dense.value(0, lo + s * w)).abs() < 1e-12);
+        }
+
+        #[test]
+        fn a_value_is_found_again(
+            steps in proptest::collection::vec(1e-3..10.0f64, 1..=MAX_DEGREE), falls in any::<bool>(), s in 0.0..0.999f64,
+        ) {
+            let sign = if falls { -1.0 } else { 1.0 };
+            let c: Vec<f64> = std::iter::once(3.0)
+                .chain(steps.iter().scan(3.0, |x, step| { *x += sign * step; Some(*x) }))
+                .collect();
+            let dense = Dense::new(SimTime::ZERO, None, 2.0, steps.len(), c);
+            let value = dense.value(0, s);
+            let found = dense.position_of(0, value);
+            prop_assert!((dense.value(0, found) - value).abs() <= 1e-14 * value.abs().max(1.0));
+            let rest = dense.rest(found, SimTime::new(5.0), value);
+            prop_assert_eq!((rest.value(0, 0.0), rest.value(0, 1.0)), (value, dense.value(0, 1.0)));
+            let (middle, whole) = (rest.value(0, 0.5), dense.value(0, found + 0.5 * (1.0 - found)));
+            prop_assert!((middle - whole).abs() <= 1e-13 * whole.abs().max(1.0));
         }
 
         #[test]

@@ -3,8 +3,8 @@
 use dlsys_session::Session;
 use dlsys_sim::Settings;
 
-/// x' = 1 + sin(x)/2 from 0 to 3, again and again, each time from a little further on.
-const LIVES: &str = "initial string: A(0, 0)\nA(x, n):\n  if x < 3 solve dx/dt = 1 + 0.5*sin(x)\n  if x = 3 produce A(1e-12*n, n + 1)\n";
+/// x' = 1 + sin(x)/2 from 0 to 3, again and again, each time with another rate, by less than counts.
+const LIVES: &str = "initial string: A(0, 0)\nA(x, n):\n  if x < 3 solve dx/dt = 1 + 0.5*sin(x) + 1e-14*n\n  if x = 3 produce A(0, n + 1)\n";
 
 /// The time of one life: 2/q atan((tan(x/2) + a)/q) with a = 1/2 and q² = 1 - a², from 0 to 3.
 fn life() -> f64 {
@@ -31,7 +31,7 @@ fn no_step_is_rejected_once_some_lives_are_known() {
 }
 
 /// Lives that begin alike are alike: their steps are made once for each power of two of the time, also where something that no equation reads
-/// tells them apart. What reads the time, or another module, is not.
+/// tells them apart. So are those that begin elsewhere on the way of another. What reads the time, or another module, or differs in its rates, is not.
 #[test]
 fn lives_that_are_alike_are_integrated_once() {
     let after = |text: &str, lives: f64| {
@@ -42,13 +42,18 @@ fn lives_that_are_alike_are_integrated_once() {
         let stats = simulation.stats();
         (stats.rhs_evaluations, simulation.take_events().last().map_or(0.0, |event| event.time))
     };
-    let alike = LIVES.replace("1e-12*n", "0");
-    let read = LIVES.replace("0.5*sin(x)", "0.5*sin(x) + 1e-12*sin(t)").replace("1e-12*n", "0");
+    let alike = LIVES.replace(" + 1e-14*n", "");
+    let further = alike.replace("A(0, n + 1)", "A(1e-12*n, n + 1)");
+    let read = LIVES.replace("1e-14*n", "1e-12*sin(t)");
     let of_a_neighbour = "initial string: B(0) A(0, 0)\nB(b): solve db/dt = 1\nB(b) < A(x, n):\n  if x < 3 solve dx/dt = 1 + 0.5*sin(x) + 1e-12*sin(b)\n  if x = 3 produce A(0, n + 1)\n";
     let (first, _) = after(LIVES, 1.5);
-    for (text, most) in
-        [(&*alike, 16.0), (LIVES, f64::INFINITY), (&read, f64::INFINITY), (of_a_neighbour, f64::INFINITY)]
-    {
+    for (text, most) in [
+        (&*alike, 16.0),
+        (&further, 32.0),
+        (LIVES, f64::INFINITY),
+        (&read, f64::INFINITY),
+        (of_a_neighbour, f64::INFINITY),
+    ] {
         let (work, last) = after(text, 1000.5);
         assert!((last - 1000.0 * life()).abs() < 1e-4 * 1000.0, "{text}: {last}");
         let lives = work as f64 / first as f64;

@@ -7,6 +7,8 @@
 //! Times are kept as durations since the start of the step, so a follower is exactly where it would be if its own step had been made,
 //! but for the rounding of times. What the resolution of time decides (which events are one instant) changes with its size; so an instant
 //! counts by its power of two even where equations read no time.
+//!
+//! Modules with one autonomous equation need not even have one value: see [`orbits`](crate::flow::orbits).
 
 use std::hash::Hasher;
 use std::sync::Arc;
@@ -16,6 +18,7 @@ use rustc_hash::FxHasher;
 use crate::error::Error;
 use crate::flow::FlowStage;
 use crate::flow::independent::{Experience, Made};
+use crate::flow::orbits::{Onward, Orbits, Traveller};
 use crate::schedule::Owner;
 use crate::trajectory::Trajectory;
 use crate::world::state::{Next, NextKind, State, Step};
@@ -33,7 +36,7 @@ const PERIOD: u32 = 1024;
 /// Modules with more parameters are none for which steps are kept: those may be large.
 const MOST_PARAMETERS: usize = 32;
 
-/// All that a step, and what is found in it, depends on, as words; and a hash of them.
+/// All that a step, and what is found in it, depends on, as words, first what does not move; and a hash of them.
 #[derive(Debug, Default, PartialEq)]
 struct Standing {
     hash: u64,
@@ -70,6 +73,17 @@ pub struct KnownSteps {
     places: Vec<Option<Arc<KnownStep>>>,
     /// How the module stands whose step is being made.
     now: Standing,
+    orbits: Orbits,
+    /// What its orbit depends on, if it has one.
+    orbit: Option<Rests>,
+}
+
+/// What an orbit depends on: the first words of a [`Standing`], and their hash; and the error of the module before its step.
+#[derive(Clone, Copy, Debug)]
+struct Rests {
+    hash: u64,
+    words: usize,
+    error: f64,
 }
 
 /// What the equations and conditions of a rule read under a clause: the module's own parameters, one bit each, and whether they read the time.
@@ -77,6 +91,7 @@ pub struct KnownSteps {
 struct Reading {
     parameters: u32,
     time: bool,
+    age: bool,
     /// Steps in a row that no other had been like.
     misses: u32,
 }
@@ -95,11 +110,8 @@ impl KnownSteps {
             let both = [&solve.rates, &rule.sides].into_iter().flat_map(|program| program.reads());
             let own = both.clone().filter(|variable| **variable < rule.parameters.len().min(MOST_PARAMETERS));
             let parameters = own.fold(0, |all, parameter| all | 1 << parameter);
-            Reading {
-                parameters,
-                time: both.clone().any(|variable| *variable == rule.time_variable()),
-                misses: 0,
-            }
+            let reads = |clock: usize| both.clone().any(|variable| *variable == rule.time_variable() + clock);
+            Reading { parameters, time: reads(0), age: reads(1), misses: 0 }
         };
         let readings = (model.rules.iter())
             .map(|rule| rule.solves.iter().map(|solve| reading(rule, solve)).collect())
@@ -117,10 +129,16 @@ impl KnownSteps {
         (known.standing == self.now).then(|| known.clone())
     }
 
-    /// Notes that a step has been found.
-    fn note_hit(&mut self, known: &KnownStep) {
-        let clause = known.standing.words[0];
+    /// Notes that a step has been found for the present module.
+    fn note_hit(&mut self) {
+        let clause = self.now.words[0];
         self.readings[(clause >> 32) as usize][clause as u32 as usize].misses = 0;
+    }
+
+    /// Hashes all that the present module's step depends on.
+    fn hash_all(&mut self) {
+        let Standing { hash, words } = &mut self.now;
+        *hash = hash_of(words);
     }
 
     /// Keeps the step of the present module, in the memory of the one whose place it takes.
@@ -147,12 +165,18 @@ impl KnownSteps {
     }
 }
 
+fn hash_of(words: &[u64]) -> u64 {
+    let mut hasher = FxHasher::default();
+    words.iter().for_each(|word| hasher.write_u64(*word));
+    hasher.finish()
+}
+
 /// How a module goes on.
 pub(super) enum Followed {
     /// By the step of one that stood like it.
     Alike,
-    /// By a step of its own, which may be worth being kept.
-    Alone { is_kept: bool },
+    /// By a step of its own, which may be worth being kept, with a part of the tolerance.
+    Alone { is_kept: bool, accuracy: f64 },
 }
 
 impl FlowStage<'_, '_> {
@@ -163,77 +187,131 @@ impl FlowStage<'_, '_> {
         from: SimTime,
         experience: &Experience,
     ) -> Result<Followed, Error> {
-        if !self.stand(id, from, experience) {
-            return Ok(Followed::Alone { is_kept: false });
-        }
-        let Some(known) = self.flows.known_steps.get() else {
-            return Ok(Followed::Alone { is_kept: true });
+        let Some(orbit) = self.stand(id, from, experience) else {
+            return Ok(Followed::Alone { is_kept: false, accuracy: 1.0 });
         };
-        self.flows.known_steps.note_hit(&known);
+        let accuracy = match orbit.map(|x| self.along_orbit(x, from)) {
+            Some(Ok(onward)) => {
+                self.flows.known_steps.note_hit();
+                self.follow(id, from, onward)?;
+                return Ok(Followed::Alike);
+            }
+            Some(Err(accuracy)) => accuracy,
+            None => 1.0,
+        };
+        self.stand_exactly(id, from, experience);
+        let Some(known) = self.flows.known_steps.get() else {
+            return Ok(Followed::Alone { is_kept: true, accuracy });
+        };
+        self.flows.known_steps.note_hit();
         // Steps of one standing at one instant are the same to the last bit.
         let start = known.made.dense.start;
         let moved = |time: SimTime| if from == start { time } else { from.after(time.since(start)) };
         let mut made = known.made.clone();
         (made.dense.start, made.dense.end) = (from, moved(made.dense.end));
+        let (next, at) = (known.next.moved(moved), moved(known.at));
+        self.follow(id, from, Onward { made, next, at })?;
+        Ok(Followed::Alike)
+    }
+
+    /// Gives a module a step that is known, with what was found in it.
+    fn follow(&mut self, id: ModuleId, from: SimTime, onward: Onward) -> Result<(), Error> {
+        let Onward { made, next, at } = onward;
         self.take_step(id, from, made)?;
         let state = self.world.state_mut(id).expect("has a step");
-        let (near, index) = (state.next.near(), state.rule.get());
-        state.next = known.next.moved(moved);
-        self.schedule.schedule(Owner::Module(id.slot() as u32), moved(known.at));
-        self.detector.note_approach(index.unwrap_or(0), known.next.near(), near, moved(known.at));
-        Ok(Followed::Alike)
+        let (near, before, index) = (next.near(), state.next.near(), state.rule.get());
+        state.next = next;
+        self.schedule.schedule(Owner::Module(id.slot() as u32), at);
+        self.detector.note_approach(index.unwrap_or(0), near, before, at);
+        Ok(())
+    }
+
+    /// The step along the orbit on which a module stands; or the part of the tolerance with which it has to make its own.
+    fn along_orbit(&mut self, x: f64, from: SimTime) -> Result<Onward, f64> {
+        let KnownSteps { orbits, orbit, now, .. } = &mut self.flows.known_steps;
+        let Rests { hash, words, error } = orbit.ok_or(1.0)?;
+        let traveller = Traveller { from, error, tolerance: self.setup.settings.tolerance };
+        orbits.find((hash, &now.words[..words]), x, traveller)
     }
 
     /// Keeps the step that a module has made since [`follow_alike`](Self::follow_alike) asked for it, and that goes on at an instant.
     pub(super) fn keep_step(&mut self, id: ModuleId, at: SimTime) {
         let Some(state) = self.world.state(id) else { return };
         let is_plain = matches!(state.next.kind, NextKind::Event | NextKind::Window);
-        if let Some(step) = state.step.as_ref().filter(|_| is_plain) {
+        let Some(step) = state.step.as_ref().filter(|_| is_plain) else { return };
+        let KnownSteps { orbits, orbit, now, .. } = &mut self.flows.known_steps;
+        let is_kept = orbit.is_some_and(|Rests { hash, words, error }| {
+            orbits.keep((hash, &now.words[..words]), step, (&state.next, at), error)
+        });
+        if !is_kept {
             self.flows.known_steps.keep(step, &state.next, at);
         }
     }
 
-    /// Notes how a module stands before a step. False if its steps depend on anything else.
-    fn stand(&mut self, id: ModuleId, from: SimTime, experience: &Experience) -> bool {
+    /// Notes how a module stands before a step, as far as it rests. None if its steps depend on anything else; then the value of its only
+    /// integrated parameter, if all that its step reads and that moves is this.
+    fn stand(&mut self, id: ModuleId, from: SimTime, experience: &Experience) -> Option<Option<f64>> {
         let tree = &self.world.tree;
-        let (Some(state), values) = (self.world.state(id), tree.parameters(id)) else { return false };
-        let (Some(index), Some(solve)) = (state.rule.get(), state.solve.get()) else { return false };
+        let (state, values) = (self.world.state(id)?, tree.parameters(id));
+        let (index, solve) = (state.rule.get()?, state.solve.get()?);
         let rule = &self.setup.model.rules[index];
         if values.len() > MOST_PARAMETERS || !reads_nothing_else(state, rule, solve) {
-            return false;
+            return None;
         }
-        let KnownSteps { readings, now: Standing { hash, words }, .. } = &mut self.flows.known_steps;
+        let KnownSteps { readings, now: Standing { words, .. }, orbit, .. } = &mut self.flows.known_steps;
         let reading = &mut readings[index][solve];
         if !reading.is_worth() {
-            return false;
+            return None;
         }
-        let Reading { parameters, time: reads_time, .. } = &*reading;
+        let Reading { parameters, time, age, .. } = &*reading;
+        let is_timed = *time || self.setup.settings.method.is_fixed_step();
         words.clear();
         words.push((index as u64) << 32 | solve as u64);
-        words.push(tree.kind(id).index() as u64);
+        words.push((tree.kind(id).index() as u64) << 1 | u64::from(state.numeric_only));
+        let [high, _] = from.bits();
+        words.push(high >> (f64::MANTISSA_DIGITS - 1));
+        let (mut moving, mut others) = (None, is_timed || *age || state.next.near() != 0);
         for (parameter, value) in values.iter().enumerate() {
-            if parameters & 1 << parameter != 0
-                || matches!(state.trajectories.get(parameter), Some(Trajectory::Step(_)))
-            {
-                words.push(value.to_bits());
+            match state.trajectories.get(parameter) {
+                None | Some(Trajectory::Rest) if parameters & 1 << parameter != 0 => {
+                    words.push(value.to_bits())
+                }
+                None | Some(Trajectory::Rest) => {}
+                Some(Trajectory::Step(_)) if moving.is_none() => moving = Some(*value),
+                Some(_) => others = true,
             }
         }
-        state.signs.iter().for_each(|sign| words.push(*sign as u64));
-        state.switches.iter().for_each(|on| words.push(u64::from(*on)));
+        words.extend(state.signs.iter().map(|sign| *sign as u64));
+        words.extend(state.switches.iter().map(|on| u64::from(*on)));
+        let x = moving.filter(|_| !others);
+        let (words, error) = (&words[..], experience.control.error);
+        *orbit = x.map(|_| Rests { hash: hash_of(words), words: words.len(), error });
+        Some(x)
+    }
+
+    /// Adds what moves.
+    fn stand_exactly(&mut self, id: ModuleId, from: SimTime, experience: &Experience) {
+        let tree = &self.world.tree;
+        let state = self.world.state(id).expect("it stands");
+        let KnownSteps { readings, now: Standing { words, .. }, .. } = &mut self.flows.known_steps;
+        let clause = words[0];
+        let Reading { parameters, time, .. } = readings[(clause >> 32) as usize][clause as u32 as usize];
+        for (parameter, value) in tree.parameters(id).iter().enumerate() {
+            match state.trajectories.get(parameter) {
+                None | Some(Trajectory::Rest) => {}
+                Some(Trajectory::Step(_)) => words.push(value.to_bits()),
+                Some(_) if parameters & 1 << parameter != 0 => words.push(value.to_bits()),
+                Some(_) => {}
+            }
+        }
         words.push(state.next.near());
         words.push(from.since(state.since).to_bits());
         words.push(from.since(tree.birth(id)).to_bits());
-        experience.note(state.numeric_only, words);
-        let [high, low] = from.bits();
-        if *reads_time || self.setup.settings.method.is_fixed_step() {
-            words.extend([high, low]);
-        } else {
-            words.push(high >> (f64::MANTISSA_DIGITS - 1));
+        experience.note(words);
+        if time || self.setup.settings.method.is_fixed_step() {
+            words.extend(from.bits());
         }
-        let mut hasher = FxHasher::default();
-        words.iter().for_each(|word| hasher.write_u64(*word));
-        *hash = hasher.finish();
-        true
+        self.flows.known_steps.hash_all();
     }
 }
 

@@ -54,10 +54,10 @@ pub struct Experience {
 
 impl Experience {
     /// Adds what a step depends on. The length with which a trajectory begins is a guess of no consequence.
-    pub fn note(&self, numeric_only: bool, words: &mut Vec<u64>) {
+    pub fn note(&self, words: &mut Vec<u64>) {
         let Experience { control, number, hurdle, goes_on } = self;
         words.push(control.error.to_bits());
-        words.push(u64::from(*number) << 2 | u64::from(*goes_on) << 1 | u64::from(numeric_only));
+        words.push(u64::from(*number) << 1 | u64::from(*goes_on));
         if *goes_on {
             let Control { size, last_error, stiffness_count, stiff, .. } = control;
             words.extend([size.to_bits(), last_error.to_bits()]);
@@ -302,7 +302,7 @@ impl FlowStage<'_, '_> {
         Experience { control, number, hurdle, goes_on: last.is_some_and(|s| s.live) }
     }
 
-    /// Makes a step of a module from its values in the tree, with this experience; returns its length.
+    /// Makes a step of a module from its values in the tree, with this experience and a part of the tolerance; returns its length.
     ///
     /// # Errors
     /// If no step can be made, or steps hardly advance time.
@@ -311,10 +311,11 @@ impl FlowStage<'_, '_> {
         id: ModuleId,
         from: SimTime,
         experience: Experience,
+        accuracy: f64,
     ) -> Result<f64, Error> {
         let Experience { mut control, number, mut hurdle, .. } = experience;
         let rejected = self.log.stats.rejected;
-        let dense = self.make_own_step(id, from, &mut control).map_err(|error| {
+        let dense = self.make_own_step(id, from, &mut control, accuracy).map_err(|error| {
             let own = |component: usize| {
                 let state = self.world.state(id)?;
                 let is_it = |m: &Trajectory| matches!(m, Trajectory::Step(c) if *c as usize == component);
@@ -383,6 +384,7 @@ impl FlowStage<'_, '_> {
         id: ModuleId,
         from: SimTime,
         control: &mut Control,
+        accuracy: f64,
     ) -> Result<Dense, StepError> {
         let state = self.world.state(id).expect("a module with a rule");
         let (index, solve) =
@@ -404,7 +406,9 @@ impl FlowStage<'_, '_> {
             integrator.restart(self.setup.settings.method, y.len());
         }
         let fixed = self.setup.settings.method.is_fixed_step();
-        let settings = self.setup.settings.for_clocks(solve.has_hazard_clock);
+        let mut settings = self.setup.settings.for_clocks(solve.has_hazard_clock);
+        settings.tolerance *= accuracy;
+        let error = control.error;
         let stiff = control.stiff || self.setup.settings.method.is_implicit();
         let pulses = !solve.pulses.is_empty() && !fixed;
         integrator.keep_reached(pulses);
@@ -439,6 +443,8 @@ impl FlowStage<'_, '_> {
         };
         (self.flows.registers, self.scratch.registers) = (system.variables, system.scratch);
         self.flows.y = y;
+        // A step that is more accurate does not make the values more accurate from which it leads.
+        control.error = control.error.max(error);
         step
     }
 

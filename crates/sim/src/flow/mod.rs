@@ -16,6 +16,7 @@ mod independent;
 pub mod integrator;
 pub mod known_rates;
 pub mod lazy;
+mod orbits;
 pub mod prediction;
 mod rates;
 
@@ -211,13 +212,13 @@ impl FlowStage<'_, '_> {
         state.next = state.next.again();
         let searched = !numeric && needs_search(state, rule);
         let experience = numeric.then(|| self.experience(id));
-        let is_kept = match experience.map(|own| self.follow_alike(id, from, &own)).transpose()? {
+        let (is_kept, accuracy) = match experience.map(|own| self.follow_alike(id, from, &own)).transpose()? {
             Some(Followed::Alike) => return Ok(()),
-            Some(Followed::Alone { is_kept }) => is_kept,
-            None => false,
+            Some(Followed::Alone { is_kept, accuracy }) => (is_kept, accuracy),
+            None => (false, 1.0),
         };
         let (h, limit) = if let Some(experience) = experience {
-            match self.step_independent(id, from, experience) {
+            match self.step_independent(id, from, experience, accuracy) {
                 Ok(h) => (h, 1.0),
                 Err(error) => return self.arrest(id, from).ok_or(error),
             }
