@@ -69,6 +69,16 @@ pub struct Crossing {
     pub level: Option<(usize, f64)>,
 }
 
+/// What the rounding of variables does to the sides of an atom.
+struct Widened {
+    /// On the difference of the sides.
+    width: f64,
+    /// The size of the sides.
+    size: f64,
+    /// The sides are defined, and finite.
+    bounded: bool,
+}
+
 /// The difference of the two sides of an atom, as a function of the position on a path.
 pub struct Difference<'w, 'p> {
     path: &'w Path<'p>,
@@ -255,7 +265,7 @@ impl CrossingDetector {
                 tolerance = tolerance.max(noise).max(self.rounding(path, atom, from));
             }
         }
-        let Root { position, at, mut after } = loop {
+        let Root { position, mut at, mut after } = loop {
             let root = match LevelDifference::new(path, atom) {
                 Some(mut plain) => first_root(&mut plain, from, limit, sign, tolerance),
                 None => first_root(&mut self.difference(path, atom), from, limit, sign, tolerance),
@@ -266,6 +276,9 @@ impl CrossingDetector {
                 None => break root,
             }
         };
+        if at == after && after == opposite(sign) && self.passes_by_rounding(path, atom, position) {
+            at = Sign::Zero;
+        }
         let behind =
             position + if path.rule.jumping_whole[atom] { self.blur(path, atom, position) } else { 0.0 };
         if position < behind && behind < limit {
@@ -308,8 +321,28 @@ impl CrossingDetector {
         times.fold(BLUR * path.start.resolution() / path.h, f64::max).min(longest)
     }
 
+    /// True if a difference that is found on the one side of zero, and then on the other, is a difference of large numbers, none of which
+    /// may come nearer to zero: it passes zero without a jump.
+    fn passes_by_rounding(&mut self, path: &Path, atom: usize, at: f64) -> bool {
+        let there = self.difference(path, atom).value(at).abs();
+        let jumps = path.rule.jumping_whole[atom]
+            || path.rule.atom_reads[atom].iter().any(|variable| path.is_function(*variable));
+        match jumps {
+            true => there <= self.rounding(path, atom, at),
+            // Where it passes through infinity, rounding does so, too.
+            false => self.widened(path, atom, at).bounded,
+        }
+    }
+
     /// The effect of the rounding of the variables on the difference of two sides; 0 where the difference jumps.
     pub(super) fn rounding(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        let Widened { width, size, .. } = self.widened(path, atom, at);
+        // A larger effect is that of a jump.
+        if width <= NOISE * size.max(1.0) { width } else { 0.0 }
+    }
+
+    /// What the rounding of the variables does to two sides.
+    fn widened(&mut self, path: &Path, atom: usize, at: f64) -> Widened {
         path.over(at, at, &mut self.bounds);
         for variable in &mut self.bounds {
             let width = 64.0 * f64::EPSILON * variable.value.magnitude();
@@ -321,9 +354,8 @@ impl CrossingDetector {
         sides.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
         let [a, b] = [0, 1].map(|side| self.bounds_out[2 * atom + side].value);
         let width = (a.hi - a.lo) + (b.hi - b.lo);
-        // A larger effect is that of a jump.
-        let size = a.magnitude().max(b.magnitude()).max(1.0);
-        if width <= NOISE * size { width } else { 0.0 }
+        let bounded = width.is_finite() && !a.is_empty() && !b.is_empty() && !a.partial && !b.partial;
+        Widened { width, size: a.magnitude().max(b.magnitude()), bounded }
     }
 
     /// The crossing at which a variable that moves monotonically takes the level at which its atom's sides meet.

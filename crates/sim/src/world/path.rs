@@ -282,6 +282,11 @@ impl<'p> Path<'p> {
         self.world.state(id)?.trajectories.get(parameter)
     }
 
+    /// True for a parameter that follows a function of time, which may jump.
+    pub fn is_function(&self, variable: usize) -> bool {
+        self.law_of(variable).is_some_and(|law| matches!(law, Trajectory::Function(_)))
+    }
+
     /// False for a variable that is a parameter at rest.
     pub fn moves(&self, variable: usize) -> bool {
         let rests = self.law_of(variable).is_none_or(|law| matches!(law, Trajectory::Rest));
