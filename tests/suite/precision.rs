@@ -281,3 +281,91 @@ fn what_grows_from_next_to_nothing_is_right_when_it_is_large() {
         }
     }
 }
+
+#[test]
+fn differences_of_large_numbers_meet_their_levels() {
+    // No two numbers of their size differ by the level. d = c - l of the first: d' = 1 - d/10; the others: exponentials that cancel.
+    for (text, at) in [
+        (
+            "L(5000) A(5000)\nL(l) < A(c):\n solve dc/dt = 1 + 0.05*(l - c)\n if c - l = 2.1 produce B(t)\nL(l) > A(c): solve dl/dt = 0.05*(c - l)",
+            -10.0 * 0.79_f64.ln(),
+        ),
+        (
+            "L(3000000) A(3000000)\nL(l) < A(c):\n solve dc/dt = 1 + 0.05*(l - c)\n if c - l = 2.1 produce B(t)\nL(l) > A(c): solve dl/dt = 0.05*(c - l)",
+            -10.0 * 0.79_f64.ln(),
+        ),
+        (
+            "A(3000, 3000)\nA(x, y):\n if y - x < 1.1 solve dx/dt = x/3000 - 1, dy/dt = x/3000\n if y - x = 1.1 produce B(t)",
+            1.1,
+        ),
+        (
+            "A(0.1623)\nA(x):\n solve dx/dt = 0.5758*exp(-0.0001859*age)\n if x = 0.3359 produce B(t)",
+            -(1.0_f64 - (0.3359 - 0.1623) * 0.0001859 / 0.5758).ln() / 0.0001859,
+        ),
+        (
+            "A(0.3607, 0.6574)\nA(x, c):\n if x < 1.631 solve dx/dt = 0.4396*c, dc/dt = -0.0001332*c\n if x = 1.631 produce B(t)",
+            -(1.0_f64 - (1.631 - 0.3607) * 0.0001332 / (0.4396 * 0.6574)).ln() / 0.0001332,
+        ),
+    ] {
+        for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau] {
+            let settings = Settings { method, tolerance: 1e-10, ..Settings::default() };
+            let strings = run(&format!("initial string: {text}"), settings, &[5.0]).expect(text);
+            let (name, values) = strings[0].last().expect("a module");
+            // Of three millions, a tolerance is 0.0003.
+            assert!(
+                name == "B" && (values[0] - at).abs() < 1e-3,
+                "{method:?} {text}: {name}{values:?}, not {at}"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_jumps_over_a_level_does_not_meet_it() {
+    let text = "initial string: A(0, 0) C(0) D(0)\nA(x, v):\n solve dx/dt = 1, v = 2*floor(x)\n if v = 3 produce B\nC(x):\n solve dx/dt = 1\n if 2*floor(x) = 3 produce B\nD(x):\n solve dx/dt = cos(x)\n if 1/(x - 0.5) = 0 produce B\nB: if t < 0 produce ε";
+    for method in [Method::Auto, Method::Radau] {
+        let settings = Settings { method, ..Settings::default() };
+        let strings = run(text, settings, &[1.0, 2.0, 5.0]).expect("runs");
+        let names: Vec<&str> = strings.iter().flatten().map(|(name, _)| &**name).collect();
+        assert_eq!(names, ["A", "C", "D"].repeat(3), "{method:?}");
+    }
+}
+
+/// After a rest of many time scales next to nothing is left of what has decayed, which says nothing about errors once something flows in.
+#[test]
+fn what_has_decayed_to_nothing_is_driven_anew() {
+    let (s, u) = (-0.1 * (1.0 - (-1.0_f64).exp()), -0.1 / 3.0 * (1.0 - (-3.0_f64).exp()));
+    let alone = Settings { method: Method::Dop853, tolerance: 1e-11, ..Settings::default() };
+    let fresh = |text: &str| run(text, alone, &[1.0]).expect("runs")[0][0].1.clone();
+    let cubic = fresh("initial string: C(0)\nC(c): solve dc/dt = -c - 0.1 - c^3");
+    let both = fresh("initial string: C(0, 0)\nC(c, d): solve dc/dt = d - 2*c - 0.1, dd/dt = c - 2*d - d^3");
+    let linear = "A(y, e) < C(c) > D(d): solve dc/dt = d - 2*c - 0.1*e\nC(c) < D(d): solve dd/dt = -2*d + c";
+    let alone = "A(y, e) < C(c): solve dc/dt = -c - 0.1*e - c^3";
+    let pair = "A(y, e) < C(c, d): solve dc/dt = d - 2*c - 0.1*e, dd/dt = c - 2*d - d^3";
+    for (start, equations, wanted) in [
+        ("C(1) D(1)", linear, vec![0.5 * (s + u), 0.5 * (s - u)]),
+        ("C(0) D(0)", linear, vec![0.5 * (s + u), 0.5 * (s - u)]),
+        ("C(1)", alone, cubic.clone()),
+        ("C(0)", alone, cubic),
+        ("C(1, 1)", pair, both),
+    ] {
+        for rest in [1000.0, 10_000.0, 86_200.0] {
+            let signal = format!("A(x, e):\n solve dx/dt = 1\n if x = {rest} produce A(0, 1)");
+            let text = format!("initial string: A(0, 0) {start}\n{signal}\n{equations}");
+            for (method, tolerance) in
+                [Method::Auto, Method::Radau].into_iter().flat_map(|m| [1e-4, 1e-6, 1e-9].map(|tol| (m, tol)))
+            {
+                let settings = Settings { method, tolerance, ..Settings::default() };
+                let found = run(&text, settings, &[rest + 1.0])
+                    .unwrap_or_else(|e| panic!("{method:?} {tolerance:e}: {e}\n{text}"));
+                let values = found[0][1..].iter().flat_map(|(_, values)| values);
+                for (value, wanted) in values.zip(&wanted) {
+                    assert!(
+                        (value - wanted).abs() < 10.0 * tolerance,
+                        "{method:?} {tolerance:e}: {value}, not {wanted}\n{text}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -99,8 +99,10 @@ pub trait OneStep {
 
     /// The largest estimated error of a component in the step just tried, relative to max(1, |value|). `error` and `tolerance` are
     /// those of the trial.
-    fn absolute_error(&self, _work: &Workspace, step: Step<'_>, error: f64, tolerance: f64) -> f64 {
-        step.y.iter().fold(0.0, |most, y| most.max(error * tolerance * y.abs().min(1.0)))
+    fn absolute_error(&self, work: &Workspace, step: Step<'_>, error: f64, tolerance: f64) -> f64 {
+        // Errors are relative to the change in a step, too, where a value starts from nothing.
+        let sizes = step.y.iter().zip(work.rates_at_start()).map(|(y, f)| y.abs().max((step.h * f).abs()));
+        sizes.fold(0.0, |most, size| most.max(error * tolerance * size.min(1.0)))
     }
 
     /// The estimated error of each component in the step just tried, in units of what is tolerated; empty where only the largest

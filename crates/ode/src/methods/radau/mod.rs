@@ -16,7 +16,7 @@ use crate::Rates;
 use crate::dense::Dense;
 use crate::one_step::{InteriorError, OneStep, Step, Trial};
 use crate::sparse::Pattern;
-use crate::workspace::Workspace;
+use crate::workspace::{FLOOR, Workspace};
 use dlsys_expr::SimTime;
 use stages::{Attempt, Beginning, Form, Stages, Start, Stiff};
 
@@ -165,8 +165,9 @@ impl OneStep for Radau {
         let rate = work.rates_at_start();
         let largest = y.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
         self.scale.clear();
-        // As for explicit methods; but the rate at the start of a fast transient says nothing about its size.
-        let largest = if largest > 0.0 { largest } else { f64::INFINITY };
+        // As for explicit methods; but the rate at the start of a fast transient says nothing about its size. Nor does what is left of
+        // values that have decayed, once something flows in.
+        let largest = if largest > FLOOR { largest } else { f64::INFINITY };
         let floor = work.floor;
         let scale = |(y, f): (&f64, &f64)| tolerance * (y.abs().max((h * f).abs().min(largest)) + floor);
         self.scale.extend(y.iter().zip(rate).map(scale));
@@ -208,6 +209,11 @@ impl OneStep for Radau {
             Attempt::Diverged => Trial::Diverged,
             Attempt::NotFinite(component) => Trial::NotFinite(component.unwrap_or(0)),
         }
+    }
+
+    fn absolute_error(&self, _: &Workspace, step: Step<'_>, error: f64, _: f64) -> f64 {
+        let sizes = self.scale.iter().zip(step.y).map(|(scale, y)| scale / y.abs().max(1.0));
+        sizes.fold(0.0, |most, size| most.max(error * size))
     }
 
     fn component_errors(&self) -> &[f64] {
