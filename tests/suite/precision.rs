@@ -369,3 +369,35 @@ fn what_has_decayed_to_nothing_is_driven_anew() {
         }
     }
 }
+
+/// Of what has not arrived anywhere nobody knows which of two is larger: that switches nothing, and is no event.
+#[test]
+fn a_row_of_empty_cells_is_filled_from_one_end() {
+    for rate in ["max(c_l - c, 0)", "abs(c_l - c)", "c_l - c"] {
+        for (cells, production) in [(8, ""), (24, "\n if c_l < c produce X")] {
+            let row = "A(0) ".repeat(cells);
+            let first = rate.replace("c_l", "s");
+            let text = format!(
+                "initial string: S(1) {row}\nS(s) < A(c): solve dc/dt = {first}\nA(c_l) < A(c):\n solve dc/dt = {rate}{production}\nX: if t < 0 produce ε"
+            );
+            for (method, tolerance) in
+                [(Method::Auto, 1e-4), (Method::Auto, 1e-8), (Method::Dop853, 1e-6), (Method::Radau, 1e-6)]
+            {
+                let settings = Settings { method, tolerance, ..Settings::default() };
+                let found = run(&text, settings, &[4.0])
+                    .unwrap_or_else(|e| panic!("{method:?} {tolerance:e}: {e}\n{text}"));
+                // The waiting times of Poisson's process: 1 - exp(-t) times the sum of t^j/j! below the number of the cell.
+                let (mut term, mut sum) = (1.0, 0.0);
+                for (number, (name, values)) in found[0].iter().skip(1).enumerate() {
+                    sum += term;
+                    term *= 4.0 / (number as f64 + 1.0);
+                    let wanted = 1.0 - (-4.0_f64).exp() * sum;
+                    assert!(
+                        name == "A" && (values[0] - wanted).abs() < 10.0 * tolerance,
+                        "{method:?} {tolerance:e} {number}: {name}{values:?}, not {wanted}\n{text}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -6,7 +6,7 @@
 //! unless the bounds over the whole path already exclude a change of sign.
 
 use crate::detect::level::LevelDifference;
-use crate::detect::signs::{NEAR, Reach, is_at, opposite, rate_at, reach, sign_of};
+use crate::detect::signs::{NEAR, Reach, half_width, is_at, opposite, rate_at, reach, sign_of};
 use crate::world::path::Path;
 use crate::world::state::State;
 use dlsys_expr::{Binary, Dual, Interval, Program, Scratch, Value};
@@ -265,6 +265,9 @@ impl CrossingDetector {
                 tolerance = tolerance.max(noise).max(self.rounding(path, atom, from));
             }
         }
+        if matches!(sign, Sign::Zero | Sign::Any) && path.error() > 0.0 {
+            tolerance = tolerance.max(self.least_noise(path, atom, from));
+        }
         let Root { position, mut at, mut after } = loop {
             let root = match LevelDifference::new(path, atom) {
                 Some(mut plain) => first_root(&mut plain, from, limit, sign, tolerance),
@@ -319,6 +322,18 @@ impl CrossingDetector {
         let times = moves.filter(|[_, rate]| *rate != 0.0).map(|[x, rate]| BLUR * f64::EPSILON * x / rate);
         let longest = LONGEST_BLUR * path.start.to_f64().abs().max(1.0) / path.h;
         times.fold(BLUR * path.start.resolution() / path.h, f64::max).min(longest)
+    }
+
+    /// The effect on the difference of two sides of errors of integration that nobody follows, because the values are next to nothing: what has not
+    /// arrived has no sign. 0 where the difference jumps.
+    pub(super) fn least_noise(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        path.next_to_nothing(at, &mut self.around);
+        let sides = &path.rule.sides;
+        self.around_out.resize(sides.outputs(), Interval::EMPTY);
+        sides.eval(&self.around, &mut self.whole_scratch, &mut self.around_out);
+        let [a, b] = [0, 1].map(|side| self.around_out[2 * atom + side]);
+        let width = half_width(a, b);
+        if path.rule.jumping_whole[atom] || !width.is_finite() { 0.0 } else { width }
     }
 
     /// True if a difference that is found on the one side of zero, and then on the other, is a difference of large numbers, none of which

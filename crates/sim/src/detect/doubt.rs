@@ -21,6 +21,7 @@
 
 use crate::detect::crossing::{Crossing, CrossingDetector};
 use crate::detect::signs::{half_width, opposite, sign_of};
+use crate::world::path::NEXT_TO_NOTHING;
 use crate::world::path::Path;
 use dlsys_expr::{Dual, Interval};
 use dlsys_model::Sign;
@@ -342,6 +343,11 @@ impl CrossingDetector {
         sides.eval(&self.around, &mut self.whole_scratch, &mut self.around_out);
         let (a, b) = (self.around_out[2 * atom], self.around_out[2 * atom + 1]);
         let width = half_width(a, b);
+        // What is compared with a number may be next to nothing and follow its own size all the same; of two that differ by less than
+        // what is followed nobody knows which is larger.
+        let is_tiny =
+            width < path.error() * NEXT_TO_NOTHING && half_width(a, a) > 0.0 && half_width(b, b) > 0.0;
+        let width = if is_tiny { width.max(self.least_noise(path, atom, at)) } else { width };
         // A wider one is that of a jump.
         let is_jump = || width > FAR * path.error() * a.magnitude().max(b.magnitude()).max(1.0);
         if path.rule.jumping_whole[atom] && is_jump() { 0.0 } else { width }

@@ -33,6 +33,9 @@ pub struct Path<'p> {
     step: Option<&'p Dense>,
 }
 
+/// Values that are much smaller are not followed to their own accuracy; see the step control of `dlsys_ode`.
+pub const NEXT_TO_NOTHING: f64 = 1e-17;
+
 impl<'p> Path<'p> {
     pub fn new(world: &'p World, state: &'p State, rule: &'p Rule, start: SimTime, h: f64) -> Path<'p> {
         Path { world, state, rule, start, h, wanted: &rule.watched, step: None }
@@ -243,6 +246,19 @@ impl<'p> Path<'p> {
                 around(value, ROUNDING * trajectory.rounded(x, value))
             },
             |t| around(t + tau, 0.0),
+        );
+    }
+
+    /// The values at a position, those that are integrated with the errors that they have when they are next to nothing.
+    pub fn next_to_nothing(&self, position: f64, out: &mut Vec<Interval>) {
+        let tau = position * self.h;
+        let exactly = |x| Interval::constant(x);
+        self.each(
+            out,
+            exactly,
+            |piece| around(piece.value(position), piece.error_of(NEXT_TO_NOTHING)),
+            |trajectory, x, offset| exactly(trajectory.at(x, offset + tau)),
+            |t| exactly(t + tau),
         );
     }
 
