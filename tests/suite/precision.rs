@@ -401,3 +401,32 @@ fn a_row_of_empty_cells_is_filled_from_one_end() {
         }
     }
 }
+
+/// The error of a polynomial that is written out is not that of its terms.
+#[test]
+fn a_narrow_window_may_be_written_out() {
+    for (a, width) in [(1.4, 1e-3), (1.9, 1e-4), (2.2, 3e-6), (1.3, 1e-5)] {
+        let b = a + width;
+        let (sum, product) = (a + b, a * b);
+        for window in [
+            format!("x^2 - {sum}*x + {product} < 0"),
+            format!("x^2 + {product} < {sum}*x"),
+            format!("{product} < x*({sum} - x)"),
+            format!("x + {product}/x < {sum}"),
+        ] {
+            let leaves = window.replace(" < ", " > ");
+            let beside = format!(
+                "P(0) A(0, 0)\nP(x): solve dx/dt = 0.7*sqrt(1 + 0.1*sin(t))\nP(x) < A(n, s):\n if {window} & s = 0 produce A(n + 1, 1)\n if {leaves} & s = 1 produce A(n + 1, 0)"
+            );
+            let own = format!(
+                "A(0, 0, 0)\nA(n, s, x):\n solve dx/dt = 0.7*sqrt(1 + 0.1*sin(t))\n if {window} & s = 0 produce A(n + 1, 1, x)\n if {leaves} & s = 1 produce A(n + 1, 0, x)"
+            );
+            for text in [beside, own] {
+                let found = run(&format!("initial string: {text}"), Settings::default(), &[4.0])
+                    .unwrap_or_else(|e| panic!("{e}\n{text}"));
+                let (_, values) = found[0].iter().find(|(name, _)| name == "A").expect("a module");
+                assert_eq!(values[..2], [2.0, 0.0], "{text}");
+            }
+        }
+    }
+}

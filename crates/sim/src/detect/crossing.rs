@@ -39,18 +39,18 @@ pub struct CrossingDetector {
     pub(super) values: Vec<f64>,
     departure: Vec<Dual<f64>>,
     whole: Vec<Interval>,
-    bounds: Vec<Dual<Interval>>,
+    pub(super) bounds: Vec<Dual<Interval>>,
     scratch: Scratch<f64>,
     departure_scratch: Scratch<Dual<f64>>,
     pub(super) whole_scratch: Scratch<Interval>,
     pub(super) around: Vec<Interval>,
     pub(super) around_out: Vec<Interval>,
-    bounds_scratch: Scratch<Dual<Interval>>,
+    pub(super) bounds_scratch: Scratch<Dual<Interval>>,
     /// Both sides of every atom where the difference was last evaluated.
     pub(super) out: Vec<f64>,
     departure_out: Vec<Dual<f64>>,
     whole_out: Vec<Interval>,
-    bounds_out: Vec<Dual<Interval>>,
+    pub(super) bounds_out: Vec<Dual<Interval>>,
     rates: Vec<f64>,
 }
 
@@ -354,6 +354,12 @@ impl CrossingDetector {
         let Widened { width, size, .. } = self.widened(path, atom, at);
         // A larger effect is that of a jump.
         if width <= NOISE * size.max(1.0) { width } else { 0.0 }
+    }
+
+    /// The effect of the rounding of the variables on the difference of two sides, however large.
+    pub(super) fn rounding_width(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        let Widened { width, bounded, .. } = self.widened(path, atom, at);
+        if bounded { width } else { f64::INFINITY }
     }
 
     /// What the rounding of the variables does to two sides.

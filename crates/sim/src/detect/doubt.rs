@@ -21,10 +21,9 @@
 
 use crate::detect::crossing::{Crossing, CrossingDetector};
 use crate::detect::signs::{half_width, opposite, sign_of};
-use crate::world::path::NEXT_TO_NOTHING;
-use crate::world::path::Path;
-use dlsys_expr::{Dual, Interval};
-use dlsys_model::Sign;
+use crate::world::path::{NEXT_TO_NOTHING, Path};
+use dlsys_expr::{Dual, Interval, Value};
+use dlsys_model::{Sign, ZeroCrossing};
 use dlsys_ode::{Function, first_root};
 
 /// The rate of a difference at a position is bounded over this part of the path on both sides of it.
@@ -102,6 +101,9 @@ impl<F: Function> Function for Raised<'_, F> {
         self.0.stretch()
     }
 }
+
+/// Sides that read more variables have bounds by terms.
+const MANY_READS: usize = 8;
 
 impl CrossingDetector {
     /// The place up to which a difference that is zero at `from`, but for rounding, is nothing else, and its value there; None if it then has not the
@@ -343,6 +345,12 @@ impl CrossingDetector {
         sides.eval(&self.around, &mut self.whole_scratch, &mut self.around_out);
         let (a, b) = (self.around_out[2 * atom], self.around_out[2 * atom + 1]);
         let width = half_width(a, b);
+        let is_sum = matches!(
+            path.rule.zero_crossings(path.state.solve.get())[atom],
+            ZeroCrossing::Search { sum: Some(_), .. }
+        );
+        // By each term for itself, bounds of what is written out (`x^2 - 2*x + 1`) are far too wide.
+        let width = if is_sum || width == 0.0 { width } else { width.min(self.sensitivity(path, atom, at)) };
         // What is compared with a number may be next to nothing and follow its own size all the same; of two that differ by less than
         // what is followed nobody knows which is larger.
         let is_tiny =
@@ -351,6 +359,35 @@ impl CrossingDetector {
         // A wider one is that of a jump.
         let is_jump = || width > FAR * path.error() * a.magnitude().max(b.magnitude()).max(1.0);
         if path.rule.jumping_whole[atom] && is_jump() { 0.0 } else { width }
+    }
+
+    /// The same by the mean value theorem: the errors of the variables, which are those around their values, times the partial derivatives, and
+    /// the effect of rounding; infinite where that says nothing.
+    fn sensitivity(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        let (reads, sides) = (&path.rule.atom_reads[atom], &path.rule.sides);
+        if reads.len() > MANY_READS {
+            return f64::INFINITY;
+        }
+        let around = std::mem::take(&mut self.around);
+        let mut all = 0.0;
+        for &variable in reads {
+            let error = 0.5 * (around[variable].hi - around[variable].lo);
+            if error == 0.0 {
+                continue;
+            }
+            self.bounds.clear();
+            self.bounds
+                .extend(around.iter().map(|value| Dual { value: *value, rate: Interval::constant(0.0) }));
+            self.bounds[variable].rate = Interval::constant(error);
+            self.bounds_out.resize(sides.outputs(), Dual::constant(0.0));
+            sides.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
+            let [a, b] = [0, 1].map(|side| self.bounds_out[2 * atom + side].rate);
+            let moved = (a.hi - b.lo).abs().max((a.lo - b.hi).abs());
+            let is_known = !a.partial && !b.partial && !a.is_empty() && !b.is_empty() && moved.is_finite();
+            all += if is_known { moved } else { f64::INFINITY };
+        }
+        self.around = around;
+        all + if all.is_finite() { self.rounding_width(path, atom, at) } else { 0.0 }
     }
 
     /// True if the sides of an atom approach each other over the path, and are at its start no further apart than
