@@ -186,7 +186,8 @@ impl EventStage<'_, '_> {
             return Err(self.flow().in_doubt(id, atom));
         }
         if state.next.kind == NextKind::Fault {
-            let ends: Vec<Option<f64>> = state.trajectories.iter().map(Trajectory::end).collect();
+            let laws = state.trajectories.iter();
+            let ends: Vec<Option<f64>> = laws.map(|law| law.formula().and_then(Trajectory::end)).collect();
             let first = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
             let parameter = ends.iter().enumerate().filter_map(|(i, e)| Some((i, (*e)?))).min_by(first);
             let since = state.since;
@@ -245,7 +246,8 @@ impl EventStage<'_, '_> {
         state.renew(id);
         state.put_under(index, solve);
         state.signs = signs;
-        (state.since, state.trajectories) = (now, trajectories);
+        state.since = now;
+        state.trajectories.assign(trajectories.into_iter());
         let kind = if change.is_none() { NextKind::Nothing } else { NextKind::Event };
         state.next.touch(kind, change.into_iter().collect());
         state.restart(self.instant.number);

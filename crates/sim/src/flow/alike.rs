@@ -17,8 +17,8 @@ use crate::error::Error;
 use crate::flow::FlowStage;
 use crate::flow::independent::{Experience, Made};
 use crate::schedule::Owner;
-use crate::trajectory::Trajectory;
 use crate::world::state::{Next, NextKind, State, Step};
+use crate::world::trajectories::Law;
 use dlsys_model::{Model, Rule, Solve};
 use dlsys_tree::{ModuleId, SimTime};
 
@@ -213,7 +213,7 @@ impl FlowStage<'_, '_> {
         words.push(tree.kind(id).index() as u64);
         for (parameter, value) in values.iter().enumerate() {
             if parameters & 1 << parameter != 0
-                || matches!(state.trajectories.get(parameter), Some(Trajectory::Step(_)))
+                || matches!(state.trajectories.get(parameter), Some(Law::Step(_)))
             {
                 words.push(value.to_bits());
             }

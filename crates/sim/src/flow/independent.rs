@@ -8,6 +8,7 @@ use crate::flow::FlowStage;
 use crate::flow::integrator::{StepError, StepRequest};
 use crate::trajectory::Trajectory;
 use crate::world::state::{Control, Hurdle, State, Step};
+use crate::world::trajectories::Law;
 use crate::world::{World, describe};
 use dlsys_expr::{Program, Scratch};
 use dlsys_model::{Rule, Solve};
@@ -140,14 +141,14 @@ impl<'a> Independent<'a> {
         let mut numeric: SmallVec<[usize; 4]> = smallvec::smallvec![0; program.outputs()];
         let mut formulas = SmallVec::new();
         y.resize(program.outputs(), 0.0);
-        for (i, trajectory) in state.trajectories.iter().enumerate() {
-            match trajectory {
-                Trajectory::Rest => {}
-                Trajectory::Step(c) | Trajectory::Coupled(c) => {
-                    numeric[*c as usize] = i;
-                    y[*c as usize] = own[i];
+        for (i, law) in state.trajectories.iter().enumerate() {
+            match law {
+                Law::Rest => {}
+                Law::Step(c) | Law::Coupled(c) => {
+                    numeric[c as usize] = i;
+                    y[c as usize] = own[i];
                 }
-                formula => formulas.push((i, formula, own[i])),
+                Law::Formula(formula) => formulas.push((i, formula, own[i])),
             }
         }
         let (offset, time) = (from.since(state.since), rule.time_variable());
@@ -317,7 +318,7 @@ impl FlowStage<'_, '_> {
         let dense = self.make_own_step(id, from, &mut control).map_err(|error| {
             let own = |component: usize| {
                 let state = self.world.state(id)?;
-                let is_it = |m: &Trajectory| matches!(m, Trajectory::Step(c) if *c as usize == component);
+                let is_it = |law| matches!(law, Law::Step(c) if c as usize == component);
                 Some((id, state.trajectories.iter().position(is_it)?))
             };
             self.step_error(error, from, own)

@@ -128,7 +128,7 @@ pub fn materialise(
     state.signs = class.signs;
     state.since = life.birth;
     state.restart(instant.number);
-    state.trajectories = life.trajectories.clone();
+    state.trajectories.assign(life.trajectories.iter().cloned());
     match class.end {
         Some(End::AtBirth { .. }) => state.place(false),
         Some(End::Crossing { atom, after, .. }) => {

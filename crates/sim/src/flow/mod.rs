@@ -30,6 +30,7 @@ use crate::trajectory::Trajectory;
 use crate::world::neighbours::Neighbours;
 use crate::world::path::Path;
 use crate::world::state::{Change, Next, NextKind};
+use crate::world::trajectories::{Law, Trajectories};
 use crate::world::{Instant, World};
 use alike::{Followed, KnownSteps};
 use coupled::Coupled;
@@ -154,11 +155,8 @@ impl FlowStage<'_, '_> {
             return;
         };
         if !numeric_only && solve.is_all_numeric() {
-            let trajectories = self.begin_anew(id, false);
-            (0..rule.parameters.len()).for_each(|_| trajectories.push(Trajectory::Rest));
-            for (component, &position) in solve.numeric.iter().enumerate() {
-                trajectories[solve.of[position]] = Trajectory::Step(component as u32);
-            }
+            let numeric = solve.numeric.iter().map(|position| solve.of[*position]);
+            self.begin_anew(id, false).step(rule.parameters.len(), numeric);
             return;
         }
         let mut trajectories = std::mem::take(&mut self.flows.trajectories);
@@ -178,7 +176,7 @@ impl FlowStage<'_, '_> {
                 || !closed_form::functions(solve, rule.time_variable(), self.scratch, &mut trajectories);
         }
         if !refused {
-            self.begin_anew(id, numeric_only).extend(trajectories.drain(..));
+            self.begin_anew(id, numeric_only).assign(trajectories.drain(..));
         }
         self.flows.trajectories = trajectories;
         if refused {
@@ -186,8 +184,8 @@ impl FlowStage<'_, '_> {
         }
     }
 
-    /// Ends the trajectories of a module; those from the present on are to be put into the list, which is empty.
-    fn begin_anew(&mut self, id: ModuleId, numeric_only: bool) -> &mut SmallVec<[Trajectory; 2]> {
+    /// Ends the trajectories of a module; those from the present on are to be put in their place.
+    fn begin_anew(&mut self, id: ModuleId, numeric_only: bool) -> &mut Trajectories {
         let now = self.instant.at;
         let state = self.world.state_mut(id).expect("a module with a rule");
         state.since = now;
@@ -196,7 +194,6 @@ impl FlowStage<'_, '_> {
         if let Some(step) = &mut state.step {
             step.live = false;
         }
-        state.trajectories.clear();
         &mut state.trajectories
     }
 
@@ -239,7 +236,8 @@ impl FlowStage<'_, '_> {
         let state = self.world.state(id).expect("seen above");
         let path = Path::new(self.world, state, rule, from, h);
         let found = self.detector.crossings.search(&path, limit);
-        let end = (state.trajectories.iter()).filter_map(Trajectory::end).reduce(f64::min);
+        let formulas = state.trajectories.iter().filter_map(Law::formula);
+        let end = formulas.filter_map(Trajectory::end).reduce(f64::min);
         let end = end.map(|tau| state.since.after(tau));
         let (kind, at) = match found.event {
             Some(_) if found.in_doubt => (NextKind::Doubt, found.touched[0].time),
@@ -313,10 +311,10 @@ impl FlowStage<'_, '_> {
         let state = self.world.state(id).expect("scheduled");
         let first = self.world.tree.places(id).start;
         let ends: SmallVec<[(usize, f64); 4]> = (state.trajectories.iter().enumerate())
-            .filter_map(|(parameter, trajectory)| match trajectory {
-                Trajectory::Step(c) => {
+            .filter_map(|(parameter, law)| match law {
+                Law::Step(c) => {
                     let dense: &Dense = &state.step.as_ref()?.dense;
-                    Some((first + parameter, dense.value(*c as usize, dense.position(at))))
+                    Some((first + parameter, dense.value(c as usize, dense.position(at))))
                 }
                 _ => None,
             })
@@ -335,7 +333,7 @@ impl FlowStage<'_, '_> {
             if state.coupled {
                 self.flows.coupled.reintegrated = true;
                 self.flows.coupled.loosened.extend_from_slice(&state.context);
-                coupled.iter_mut().for_each(|solution| solution.release(&state.trajectories));
+                coupled.iter_mut().for_each(|solution| solution.release(state.trajectories.coupled()));
             }
             self.schedule.cancel(Owner::Module(id.slot() as u32));
         }

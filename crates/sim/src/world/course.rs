@@ -5,6 +5,7 @@ use super::path::Path;
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::{CoupledSolution, value_of};
 use crate::world::state::State;
+use crate::world::trajectories::Law;
 use dlsys_expr::Dual;
 use dlsys_model::Rule;
 use dlsys_ode::Dense;
@@ -56,12 +57,14 @@ impl<'c> Course<'c> {
             resting.extend_from_slice(world.tree.parameters(id));
             let Some(other) = world.state(id) else { continue };
             let own = step.filter(|_| id == state.id).or(other.step.as_ref().map(|step| &step.dense));
-            for (parameter, trajectory) in other.trajectories.iter().enumerate() {
-                let motion = match trajectory {
-                    Trajectory::Rest => None,
-                    Trajectory::Step(c) => own.map(|dense| Motion::Step(dense, *c)),
-                    Trajectory::Coupled(c) => world.coupled.as_ref().map(|all| Motion::Coupled(all, *c)),
-                    formula => Some(Motion::Formula(formula, resting[first + parameter], other.since)),
+            for (parameter, law) in other.trajectories.iter().enumerate() {
+                let motion = match law {
+                    Law::Rest => None,
+                    Law::Step(c) => own.map(|dense| Motion::Step(dense, c)),
+                    Law::Coupled(c) => world.coupled.as_ref().map(|all| Motion::Coupled(all, c)),
+                    Law::Formula(formula) => {
+                        Some(Motion::Formula(formula, resting[first + parameter], other.since))
+                    }
                 };
                 moving.extend(motion.map(|motion| (first + parameter, motion)));
             }

@@ -5,6 +5,7 @@ use super::context::gather;
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::DenseComponent;
 use crate::world::state::State;
+use crate::world::trajectories::Law;
 use dlsys_expr::{Dual, Interval, Value};
 use dlsys_model::{AffineSum, Rule};
 use dlsys_ode::Dense;
@@ -55,15 +56,15 @@ impl<'p> Path<'p> {
     }
 
     /// The dense output that a numeric trajectory follows along this stretch.
-    fn piece<'s>(&'s self, state: &'s State, trajectory: &Trajectory) -> Option<DenseComponent<'s>> {
-        match trajectory {
-            Trajectory::Step(c) => {
+    fn piece<'s>(&'s self, state: &'s State, law: Law) -> Option<DenseComponent<'s>> {
+        match law {
+            Law::Step(c) => {
                 let own = self.step.filter(|_| state.id == self.state.id);
                 let dense = own.or(state.step.as_ref().map(|step| &step.dense))?;
-                Some(DenseComponent::new(dense, *c as usize, self.start, self.h))
+                Some(DenseComponent::new(dense, c as usize, self.start, self.h))
             }
-            Trajectory::Coupled(c) => self.world.coupled.as_ref()?.piece(*c as usize, self.start, self.h),
-            _ => None,
+            Law::Coupled(c) => self.world.coupled.as_ref()?.piece(c as usize, self.start, self.h),
+            Law::Rest | Law::Formula(_) => None,
         }
     }
 
@@ -123,16 +124,16 @@ impl<'p> Path<'p> {
             return out.extend(values.iter().map(|x| rest(*x)));
         };
         let offset = self.start.since(state.since);
-        for (&x, trajectory) in values.iter().zip(&state.trajectories) {
+        for (&x, law) in values.iter().zip(state.trajectories.iter()) {
             let reads = reads(out.len());
-            out.push(match trajectory {
+            out.push(match law {
                 _ if !reads => rest(x),
-                Trajectory::Rest => rest(x),
-                Trajectory::Step(_) | Trajectory::Coupled(_) => match self.piece(state, trajectory) {
+                Law::Rest => rest(x),
+                Law::Step(_) | Law::Coupled(_) => match self.piece(state, law) {
                     Some(along) => piece(&along),
                     None => rest(x),
                 },
-                trajectory => formula(trajectory, x, offset),
+                Law::Formula(trajectory) => formula(trajectory, x, offset),
             });
         }
     }
@@ -215,8 +216,8 @@ impl<'p> Path<'p> {
             let (id, parameter) = self.place_of(variable)?;
             let state = self.world.state(id);
             match state.and_then(|state| Some((state, state.trajectories.get(parameter)?))) {
-                Some((state, trajectory)) if !matches!(trajectory, Trajectory::Rest) => {
-                    if !self.piece(state, trajectory)?.add_to(factor, &mut moving) {
+                Some((state, law)) if !matches!(law, Law::Rest) => {
+                    if !self.piece(state, law)?.add_to(factor, &mut moving) {
                         return None;
                     }
                 }
@@ -248,7 +249,6 @@ impl<'p> Path<'p> {
 
     /// True if some of these variables is integrated: it follows dense output, or is a sum in which something does.
     pub fn is_integrated(&self, variables: &[usize]) -> bool {
-        let numeric = |trajectory: &Trajectory| !trajectory.is_formula();
         variables.iter().any(|&variable| {
             let aggregate = variable.checked_sub(self.rule.first_aggregate);
             if let Some(number) = aggregate.filter(|number| *number < self.rule.aggregates.len()) {
@@ -256,10 +256,9 @@ impl<'p> Path<'p> {
                 let others = term.iter().copied().filter(|v| *v < self.rule.first_aggregate);
                 let mut children = self.state.context.children(number).iter();
                 return self.is_integrated(&others.collect::<SmallVec<[usize; 8]>>())
-                    || children
-                        .any(|id| self.world.state(*id).is_some_and(|s| s.trajectories.iter().any(numeric)));
+                    || children.any(|id| self.world.state(*id).is_some_and(State::is_numeric));
             }
-            self.law_of(variable).is_some_and(numeric)
+            self.law_of(variable).is_some_and(Law::is_numeric)
         })
     }
 
@@ -277,14 +276,14 @@ impl<'p> Path<'p> {
     }
 
     /// The trajectory of a variable that is a parameter of a module with equations.
-    fn law_of(&self, variable: usize) -> Option<&Trajectory> {
+    fn law_of(&self, variable: usize) -> Option<Law<'_>> {
         let (id, parameter) = self.place_of(variable)?;
         self.world.state(id)?.trajectories.get(parameter)
     }
 
     /// False for a variable that is a parameter at rest.
     pub fn moves(&self, variable: usize) -> bool {
-        let rests = self.law_of(variable).is_none_or(|law| matches!(law, Trajectory::Rest));
+        let rests = self.law_of(variable).is_none_or(|law| matches!(law, Law::Rest));
         self.place_of(variable).is_none() || !rests
     }
 
@@ -295,10 +294,10 @@ impl<'p> Path<'p> {
             return solution;
         }
         let error = |state: &State| {
-            let of = |trajectory: &Trajectory| match trajectory {
-                Trajectory::Coupled(_) => solution,
-                Trajectory::Step(_) => state.step.as_ref().map_or(0.0, |step| step.dense.error),
-                _ => 0.0,
+            let of = |law: Law| match law {
+                Law::Coupled(_) => solution,
+                Law::Step(_) => state.step.as_ref().map_or(0.0, |step| step.dense.error),
+                Law::Rest | Law::Formula(_) => 0.0,
             };
             state.trajectories.iter().map(of).fold(0.0, f64::max)
         };

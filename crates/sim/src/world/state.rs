@@ -2,9 +2,9 @@
 
 use smallvec::SmallVec;
 
-use crate::trajectory::Trajectory;
 use crate::world::context::Context;
 use crate::world::short::Short;
+use crate::world::trajectories::{Law, Trajectories};
 use dlsys_model::Sign;
 pub use dlsys_ode::Control;
 use dlsys_ode::Dense;
@@ -30,8 +30,8 @@ pub struct State {
     pub signs: Signs,
     /// When the trajectories began; the values in the tree are those of then.
     pub since: SimTime,
-    /// How each parameter moves; empty means that none does.
-    pub trajectories: SmallVec<[Trajectory; 2]>,
+    /// How each parameter moves.
+    pub trajectories: Trajectories,
     /// The module's own step, if it is integrated alone.
     pub step: Option<Box<Step>>,
     /// How far formulas have been looked at; NaN if they have not. Of a coupled module, the time before which none of them meets a level, which every
@@ -326,7 +326,7 @@ impl State {
             switches: Switches::new(),
             signs: Signs::new(),
             since: SimTime::ZERO,
-            trajectories: SmallVec::new(),
+            trajectories: Trajectories::default(),
             step: None,
             horizon: f64::NAN,
             numeric_only: false,
@@ -382,7 +382,7 @@ impl State {
 
     /// True if some parameter is integrated by the module's own steps.
     pub fn is_numeric(&self) -> bool {
-        self.trajectories.iter().any(|m| !m.is_formula())
+        self.trajectories.iter().any(Law::is_numeric)
     }
 
     /// Opens the module as one that was followed along its trajectory.

@@ -6,6 +6,7 @@ use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::prefetch::prefetch;
 use crate::world::state::State;
+use crate::world::trajectories::Law;
 use dlsys_expr::Scratch;
 use dlsys_model::{Read, Rule};
 use dlsys_ode::MAX_DEGREE;
@@ -185,8 +186,8 @@ impl Rows {
             match *source {
                 Source::Parameter(read) => {
                     let (module, moves) = all.module(state, read);
-                    let trajectory = moves.and_then(|state| state.trajectories.get(read.parameter));
-                    if !matches!(trajectory, None | Some(Trajectory::Rest)) {
+                    let law = moves.and_then(|state| state.trajectories.get(read.parameter));
+                    if !matches!(law, None | Some(Law::Rest)) {
                         return None;
                     }
                     self.variables[read.variable] = all.world.tree.parameters(module)[read.parameter];
@@ -215,7 +216,7 @@ impl Rows {
         let world = all.world;
         let constant = own.as_ref().map_or(equation.constant, |own| self.coefficients[own.start]);
         let (row, mut count) = (self.begin(constant), 0);
-        let Trajectory::Coupled(component) = *state.trajectories.get(equation.parameter)? else {
+        let Law::Coupled(component) = state.trajectories.get(equation.parameter)? else {
             return None;
         };
         if all.number(component) != Some(row) {
@@ -227,17 +228,17 @@ impl Rows {
             let place = || world.tree.places(module).start + read.parameter;
             let moves = moves.and_then(|state| Some((state, state.trajectories.get(read.parameter)?)));
             match moves {
-                None | Some((_, Trajectory::Rest | Trajectory::Step(_))) => {
+                None | Some((_, Law::Rest | Law::Step(_))) => {
                     self.constants[row as usize] += coefficient * world.tree.values()[place()];
                 }
-                Some((_, &Trajectory::Coupled(component))) => match all.number(component) {
+                Some((_, Law::Coupled(component))) => match all.number(component) {
                     Some(column) => self.add(row, &mut count, (column, coefficient)),
                     None => {
                         let powers = [0.0; MAX_DEGREE + 1];
                         self.inputs.push(Input { row, component, coefficient, powers });
                     }
                 },
-                Some((of, trajectory)) => {
+                Some((of, Law::Formula(trajectory))) => {
                     let column = self.formula(trajectory, place(), world, now.since(of.since))?;
                     self.add(row, &mut count, (column, coefficient));
                 }
