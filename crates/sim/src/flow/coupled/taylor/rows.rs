@@ -13,7 +13,8 @@ use dlsys_ode::MAX_DEGREE;
 use dlsys_tree::{ModuleId, SimTime};
 use std::ops::Range;
 
-/// A formula is looked for among so many that were met last: neighbours in the string read the same.
+/// A formula, and coefficients, are looked for among so many that were met last: neighbours in the string read the same, and have the
+/// same equations.
 const RECENT: usize = 4;
 /// Entries of a row side by side: those of a cell in a filament.
 const SIDE_BY_SIDE: usize = 3;
@@ -51,10 +52,33 @@ pub struct Input {
 }
 
 /// A row of A: no loop is needed over its entries, of which those that are not there are zero.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Row {
     columns: [u32; SIDE_BY_SIDE],
+    /// The number of its coefficients among those of all rows: most modules share them, and memory is what limits large tissues.
+    coefficients: u32,
+}
+
+/// The numbers of a row, which may be those of many.
+#[derive(Clone, Copy, Debug, Default)]
+struct Coefficients {
     values: [f64; SIDE_BY_SIDE],
+    constant: f64,
+}
+
+impl Coefficients {
+    fn bits(&self) -> [u64; SIDE_BY_SIDE + 1] {
+        let [a, b, c] = self.values;
+        [a, b, c, self.constant].map(f64::to_bits)
+    }
+}
+
+/// A row that is being written.
+struct Draft {
+    row: u32,
+    count: usize,
+    columns: [u32; SIDE_BY_SIDE],
+    coefficients: Coefficients,
 }
 
 /// Modules whose equations are solved together, in the order of their components.
@@ -91,9 +115,10 @@ pub type Clauses = Vec<Vec<Option<Option<LinearClause>>>>;
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
     rows: Vec<Row>,
+    /// The coefficients of the rows.
+    shared: Vec<Coefficients>,
     /// Entries that the rows have no room for: row, column and value.
     others: Vec<(u32, u32, f64)>,
-    constants: Vec<f64>,
     /// What is read from outside.
     pub inputs: Vec<Input>,
     /// Closed forms: where the parameter stands in the tree, and its row.
@@ -116,10 +141,10 @@ impl Rows {
     /// Writes the equations of modules, given the values of their components; None if some are not linear with constant coefficients.
     pub fn write(&mut self, clauses: &mut Clauses, all: Members, y: &[f64], now: SimTime) -> Option<()> {
         let Members { world, rules, .. } = all;
-        let Rows { rows, others, constants, inputs, formulas, links, .. } = self;
+        let Rows { rows, shared, others, inputs, formulas, links, .. } = self;
         rows.clear();
         others.clear();
-        constants.clear();
+        shared.clear();
         inputs.clear();
         formulas.clear();
         links.clear();
@@ -127,7 +152,6 @@ impl Rows {
         self.y.clear();
         self.y.extend_from_slice(y);
         self.rows.reserve_exact(y.len());
-        self.constants.reserve_exact(y.len());
         for (at, &id) in all.members.iter().enumerate() {
             if all.numbers.is_none() {
                 prefetch(world, all.members, at);
@@ -154,20 +178,23 @@ impl Rows {
         }
         for n in 0..self.links.len() {
             let (decay, inflow) = self.links[n];
-            let (row, mut count) = (self.begin(inflow.unwrap_or(0.0)), 0);
-            self.add(row, &mut count, (row, decay));
+            let mut draft = self.begin(inflow.unwrap_or(0.0));
+            let row = draft.row;
+            self.add(&mut draft, (row, decay));
             if inflow.is_none() {
-                self.add(row, &mut count, (row + 1, 1.0));
+                self.add(&mut draft, (row + 1, 1.0));
             }
+            self.finish(draft);
         }
         if self.rows.len() != self.y.len() {
             return None;
         }
-        let sum = |row: &Row| row.values.iter().map(|a| a.abs()).sum::<f64>();
-        self.norm = self.rows.iter().map(sum).fold(0.0, f64::max);
+        let sum = |of: &Coefficients| of.values.iter().map(|a| a.abs()).sum::<f64>();
+        self.norm = self.shared.iter().map(sum).fold(0.0, f64::max);
         for others in self.others.chunk_by(|a, b| a.0 == b.0) {
             let more: f64 = others.iter().map(|other| other.2.abs()).sum();
-            self.norm = self.norm.max(sum(&self.rows[others[0].0 as usize]) + more);
+            let row = self.rows[others[0].0 as usize];
+            self.norm = self.norm.max(sum(&self.shared[row.coefficients as usize]) + more);
         }
         self.norm.is_finite().then_some(())
     }
@@ -215,11 +242,11 @@ impl Rows {
     ) -> Option<()> {
         let world = all.world;
         let constant = own.as_ref().map_or(equation.constant, |own| self.coefficients[own.start]);
-        let (row, mut count) = (self.begin(constant), 0);
+        let mut draft = self.begin(constant);
         let Law::Coupled(component) = state.trajectories.get(equation.parameter)? else {
             return None;
         };
-        if all.number(component) != Some(row) {
+        if all.number(component) != Some(draft.row) {
             return None;
         }
         for (n, &(read, coefficient)) in equation.terms.iter().enumerate() {
@@ -229,21 +256,22 @@ impl Rows {
             let moves = moves.and_then(|state| Some((state, state.trajectories.get(read.parameter)?)));
             match moves {
                 None | Some((_, Law::Rest | Law::Step(_))) => {
-                    self.constants[row as usize] += coefficient * world.tree.values()[place()];
+                    draft.coefficients.constant += coefficient * world.tree.values()[place()];
                 }
                 Some((_, Law::Coupled(component))) => match all.number(component) {
-                    Some(column) => self.add(row, &mut count, (column, coefficient)),
+                    Some(column) => self.add(&mut draft, (column, coefficient)),
                     None => {
-                        let powers = [0.0; MAX_DEGREE + 1];
+                        let (row, powers) = (draft.row, [0.0; MAX_DEGREE + 1]);
                         self.inputs.push(Input { row, component, coefficient, powers });
                     }
                 },
                 Some((of, Law::Formula(trajectory))) => {
                     let column = self.formula(trajectory, place(), world, now.since(of.since))?;
-                    self.add(row, &mut count, (column, coefficient));
+                    self.add(&mut draft, (column, coefficient));
                 }
             }
         }
+        self.finish(draft);
         Some(())
     }
 
@@ -262,28 +290,41 @@ impl Rows {
         Some(row)
     }
 
-    /// Begins the next row with its constant, and gives its number.
-    fn begin(&mut self, constant: f64) -> u32 {
-        self.rows.push(Row::default());
-        self.constants.push(constant);
-        self.rows.len() as u32 - 1
+    /// Begins the next row with its constant.
+    fn begin(&self, constant: f64) -> Draft {
+        let coefficients = Coefficients { constant, ..Coefficients::default() };
+        Draft { row: self.rows.len() as u32, count: 0, columns: [0; SIDE_BY_SIDE], coefficients }
     }
 
-    /// Adds an entry, by column and value, to the row that was begun last, which has so many.
-    fn add(&mut self, row: u32, count: &mut usize, (column, value): (u32, f64)) {
-        let place = &mut self.rows[row as usize];
+    /// Adds an entry, by column and value, to a row.
+    #[inline]
+    fn add(&mut self, draft: &mut Draft, (column, value): (u32, f64)) {
+        let Draft { row, count, columns, coefficients } = draft;
         if *count < SIDE_BY_SIDE {
-            (place.columns[*count], place.values[*count]) = (column, value);
+            (columns[*count], coefficients.values[*count]) = (column, value);
             *count += 1;
         } else {
-            self.others.push((row, column, value));
+            self.others.push((*row, column, value));
         }
+    }
+
+    /// Ends a row.
+    fn finish(&mut self, Draft { columns, coefficients, .. }: Draft) {
+        let bits = coefficients.bits();
+        let recent = self.shared.iter().enumerate().rev().take(RECENT);
+        let known = recent.into_iter().find(|known| known.1.bits() == bits).map(|known| known.0);
+        let number = known.unwrap_or_else(|| {
+            self.shared.push(coefficients);
+            self.shared.len() - 1
+        });
+        self.rows.push(Row { columns, coefficients: number as u32 });
     }
 
     /// Makes the Taylor coefficients of the next power after `power`, given those of that; gives the largest of the components, and of all.
     pub fn differentiate(&self, power: usize, last: &[f64], next: &mut [f64], room: f64) -> [f64; 2] {
         if power == 0 {
-            next.copy_from_slice(&self.constants);
+            let constant = |row: &Row| self.shared[row.coefficients as usize].constant;
+            next.iter_mut().zip(&self.rows).for_each(|(next, row)| *next = constant(row));
         } else {
             next.fill(0.0);
         }
@@ -296,17 +337,18 @@ impl Rows {
         let factor = room / (power + 1) as f64;
         let (components, formulas) = next.split_at_mut(self.components);
         let (rows, others) = self.rows.split_at(self.components);
-        let size = multiply(rows, last, factor, components);
-        [size, size.max(multiply(others, last, factor, formulas))]
+        let size = multiply((rows, &self.shared), last, factor, components);
+        [size, size.max(multiply((others, &self.shared), last, factor, formulas))]
     }
 }
 
 /// Adds the products of rows and a vector to what is there, multiplies it by a factor, and gives the largest.
-fn multiply(rows: &[Row], x: &[f64], factor: f64, out: &mut [f64]) -> f64 {
+fn multiply((rows, shared): (&[Row], &[Coefficients]), x: &[f64], factor: f64, out: &mut [f64]) -> f64 {
     // Numbers that are not negative have the order of their bits.
     let mut largest = 0;
     for (row, out) in out.iter_mut().enumerate() {
-        let Row { columns: [a, b, c], values: [of_a, of_b, of_c] } = &rows[row];
+        let Row { columns: [a, b, c], coefficients } = &rows[row];
+        let [of_a, of_b, of_c] = &shared[*coefficients as usize].values;
         let sum = *out + of_a * x[*a as usize] + of_b * x[*b as usize] + of_c * x[*c as usize];
         *out = factor * sum;
         largest = largest.max(out.abs().to_bits());
