@@ -75,7 +75,7 @@ impl CalmTest {
         let birth = world.tree.birth(step.state.id);
         variables.push(Smooth::spanned(step.start.to_f64(), step.end.to_f64()));
         variables.push(Smooth::spanned(step.start.since(birth), step.end.since(birth)));
-        let switches = step.state.switches.iter().map(|&on| Smooth::constant(f64::from(u8::from(on))));
+        let switches = step.state.marks.switch_values().map(Smooth::constant);
         variables.extend(switches);
     }
 }

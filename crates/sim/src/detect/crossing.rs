@@ -348,7 +348,7 @@ impl CrossingDetector {
         let (values, scratch, rates) = (&mut self.values, &mut self.scratch, &mut self.rates);
         let exact = || {
             path.start(values);
-            values.extend(path.state.switches.iter().map(|&on| f64::from(u8::from(on))));
+            values.extend(path.state.marks.switch_values());
             rate_at(clause, values, variable, level, scratch, rates)
         };
         let met = reach(variable, t, level, law.and_then(Law::formula), start, exact);

@@ -46,9 +46,9 @@ impl Outlook<'_> {
         reachable(rule, state).all(|(atom, crossing)| match location_method(crossing, state) {
             LocationMethod::Never => true,
             LocationMethod::Formula(variable, level) => {
-                are_formulas_free || self.is_met_later(variable, level, state.signs[atom])
+                are_formulas_free || self.is_met_later(variable, level, state.marks.signs()[atom])
             }
-            LocationMethod::Search => self.keeps_clear(crossing, state.signs[atom]),
+            LocationMethod::Search => self.keeps_clear(crossing, state.marks.signs()[atom]),
         })
     }
 

@@ -218,8 +218,8 @@ impl FlowStage<'_, '_> {
                 words.push(value.to_bits());
             }
         }
-        state.signs.iter().for_each(|sign| words.push(*sign as u64));
-        state.switches.iter().for_each(|on| words.push(u64::from(*on)));
+        state.marks.signs().iter().for_each(|sign| words.push(*sign as u64));
+        words.extend(state.marks.switches().iter().map(|on| u64::from(*on)));
         words.push(state.next.near());
         words.push(from.since(state.since).to_bits());
         words.push(from.since(tree.birth(id)).to_bits());

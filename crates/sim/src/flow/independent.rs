@@ -126,14 +126,14 @@ impl<'a> Independent<'a> {
             context.iter().for_each(|module| world.values(*module, from, &mut variables));
         }
         // What programs leave behind the variables stays: there is room for it then.
-        let count = rule.variables + state.switches.len();
+        let count = rule.variables + state.marks.switch_values().count();
         if variables.len() < count {
             variables.resize(count, 0.0);
         }
         // Those that move, and the times, are filled in for each evaluation.
         variables[..own.len()].copy_from_slice(own);
-        for (place, &on) in variables[rule.variables..].iter_mut().zip(&state.switches) {
-            *place = f64::from(u8::from(on));
+        for (place, on) in variables[rule.variables..].iter_mut().zip(state.marks.switch_values()) {
+            *place = on;
         }
         let (t, age) = (from.to_f64(), from.since(world.tree.birth(state.id)));
         let solve = &rule.solves[state.solve.get().expect("numeric trajectories have equations")];

@@ -171,7 +171,7 @@ impl FlowStage<'_, '_> {
         } else {
             let read = (rule, solve.stepping.formulas_read());
             self.world.variables_read(read, id, &state.context, self.instant.at, &mut self.scratch.variables);
-            self.scratch.variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
+            self.scratch.variables.extend(state.marks.switch_values());
             refused = !closed_form::formulas(solve, rule.time_variable(), self.scratch, &mut trajectories)
                 || !closed_form::functions(solve, rule.time_variable(), self.scratch, &mut trajectories);
         }
@@ -280,11 +280,11 @@ impl FlowStage<'_, '_> {
             let (a, b) = (sides[2 * atom], sides[2 * atom + 1]);
             (a - b).abs() <= ARRIVED * self.setup.settings.tolerance * a.abs().max(b.abs()).max(1.0)
         };
-        let signed = |atom: &usize| matches!(state.signs[*atom], Sign::Plus | Sign::Minus);
+        let signed = |atom: &usize| matches!(state.marks.signs()[*atom], Sign::Plus | Sign::Minus);
         let touched: SmallVec<[Change; 1]> = (0..rule.atoms.len())
             .filter(signed)
             .filter(near)
-            .map(|atom| Change::new(atom, at, [Sign::Zero, state.signs[atom]]))
+            .map(|atom| Change::new(atom, at, [Sign::Zero, state.marks.signs()[atom]]))
             .collect();
         if touched.is_empty() {
             return None;

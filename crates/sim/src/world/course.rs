@@ -73,7 +73,7 @@ impl<'c> Course<'c> {
         let time = rule.time_variable();
         moving.push((time, Motion::Time));
         moving.push((time + 1, Motion::Age(world.tree.birth(state.id))));
-        resting.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
+        resting.extend(state.marks.switch_values());
         let gathered = (!rule.aggregates.is_empty()).then_some((world, state, rule, step));
         Course { resting, moving, gathered }
     }

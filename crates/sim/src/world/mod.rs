@@ -1,7 +1,7 @@
 //! The world: the modules of the structure and how their parameters move.
 //!
 //! - [`World`]: the tree, the states of materialised modules, the lives of lazy ones, the solution of the coupled ones
-//! - [`state`], [`states`]: rule, clause, signs ([`short`]), trajectories and next event of one module, and of all of them
+//! - [`state`], [`states`]: rule, clause, signs and switches ([`marks`], [`short`]), trajectories and next event of one module, and of all of them
 //! - [`trajectories`]: how the parameters of one module move
 //! - [`path`], [`course`]: the variables of a rule along a stretch of time, and at one instant after another
 //! - [`prefetch`]: memory that is asked for before it is read
@@ -12,6 +12,7 @@ pub mod context;
 pub mod coupled_solution;
 pub mod course;
 pub mod life;
+mod marks;
 pub mod neighbours;
 pub mod new_modules;
 pub mod path;

@@ -172,7 +172,7 @@ impl<'p> Path<'p> {
     /// All variables that equations read at a position.
     pub fn everything_at(&self, position: f64, out: &mut Vec<f64>) {
         self.at(position, out);
-        out.extend(self.state.switches.iter().map(|&on| f64::from(u8::from(on))));
+        out.extend(self.state.marks.switch_values());
     }
 
     /// Bounds of all variables that equations read.
@@ -185,13 +185,13 @@ impl<'p> Path<'p> {
             |trajectory, x, offset| trajectory.within(x, offset + lo * h, offset + hi * h).value,
             |t| Interval::spanned(t + lo * h, t + hi * h),
         );
-        out.extend(self.state.switches.iter().map(|&on| Interval::constant(f64::from(u8::from(on)))));
+        out.extend(self.state.marks.switch_values().map(Interval::constant));
     }
 
     /// The same with the bounds of their rates, per unit of position.
     pub fn everything_along(&self, lo: f64, hi: f64, out: &mut Vec<Dual<Interval>>) {
         self.over(lo, hi, out);
-        out.extend(self.state.switches.iter().map(|&on| Dual::constant(f64::from(u8::from(on)))));
+        out.extend(self.state.marks.switch_values().map(Dual::constant));
     }
 
     /// Bounds of values and rates from one position to another.

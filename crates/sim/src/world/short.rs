@@ -83,6 +83,13 @@ impl<T: Copy + Default> FromIterator<T> for Short<T> {
     }
 }
 
+impl<T: Copy + Default> From<&[T]> for Short<T> {
+    #[inline]
+    fn from(things: &[T]) -> Short<T> {
+        things.iter().copied().collect()
+    }
+}
+
 impl<'s, T> IntoIterator for &'s Short<T> {
     type Item = &'s T;
     type IntoIter = std::slice::Iter<'s, T>;

@@ -3,6 +3,7 @@
 use smallvec::SmallVec;
 
 use crate::world::context::Context;
+use crate::world::marks::Marks;
 use crate::world::short::Short;
 use crate::world::trajectories::{Law, Trajectories};
 use dlsys_model::Sign;
@@ -24,10 +25,9 @@ pub struct State {
     /// The active clause of it.
     pub solve: Index,
     pub context: Context,
-    /// Conditions inside the active equations.
-    pub switches: Switches,
-    /// The sign of each atom of the rule, just after the last instant at which it was examined.
-    pub signs: Signs,
+    /// The sign of each atom of the rule, just after the last instant at which it was examined, and conditions inside the active
+    /// equations.
+    pub marks: Marks,
     /// When the trajectories began; the values in the tree are those of then.
     pub since: SimTime,
     /// How each parameter moves.
@@ -323,8 +323,7 @@ impl State {
             rule: Index::NONE,
             solve: Index::NONE,
             context: Context::default(),
-            switches: Switches::new(),
-            signs: Signs::new(),
+            marks: Marks::default(),
             since: SimTime::ZERO,
             trajectories: Trajectories::default(),
             step: None,
@@ -343,7 +342,7 @@ impl State {
     pub fn renew(&mut self, id: ModuleId) {
         (self.id, self.is_alive) = (id, true);
         self.context.clear();
-        self.switches.clear();
+        self.marks.set_switches(&[]);
         (self.step, self.open) = (None, None);
         self.next.clear();
         self.horizon = f64::NAN;
@@ -388,8 +387,9 @@ impl State {
     /// Opens the module as one that was followed along its trajectory.
     pub fn follow(&mut self) -> &mut Open {
         if self.open.is_none() {
-            let flow = Some((self.solve.get(), self.switches.clone()));
-            let (at, guess) = (self.signs.clone(), self.signs.clone());
+            let flow = Some((self.solve.get(), self.marks.switches()));
+            let at = Signs::from(self.marks.signs());
+            let guess = at.clone();
             self.open = Some(Box::new(Open { at, guess, flow, ..Open::default() }));
         }
         self.open.as_mut().expect("just opened")
@@ -397,14 +397,15 @@ impl State {
 
     /// Opens the module as one whose signs are known from its values only.
     pub fn place(&mut self, clear: bool) {
-        let guess = self.signs.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect();
-        let at = self.signs.clone();
+        let at = Signs::from(self.marks.signs());
+        let guess = at.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect();
         self.open = Some(Box::new(Open { at, guess, clear, ..Open::default() }));
     }
 
     /// Takes over the signs that have changed without consequence up to an instant.
     pub fn pass_changes(&mut self, until: SimTime) {
-        let State { next, signs, .. } = self;
+        let State { next, marks, .. } = self;
+        let signs = marks.signs_mut();
         next.pass_changes(until, |change| signs[change.atom()] = change.after);
     }
 }

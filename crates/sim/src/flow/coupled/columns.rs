@@ -160,7 +160,10 @@ impl System {
             let column = if variable == time {
                 LaneColumn::Time
             } else if let Some(switch) = variable.checked_sub(switches) {
-                self.lanes.numbers(rows.iter().map(|row| f64::from(u8::from(row.0.switches[switch]))))
+                self.lanes.numbers(
+                    rows.iter()
+                        .map(|row| row.0.marks.switch_values().nth(switch).expect("a switch of the clause")),
+                )
             } else {
                 let mut reads = clause.stepping.reads(key.numeric_only).iter();
                 let read = reads.find(|read| read.variable == variable).expect("all that steps read");
@@ -180,7 +183,7 @@ impl System {
             };
             self.lanes.push_column(variable, column);
         }
-        let registers = switches + rows[0].0.switches.len();
+        let registers = switches + rows[0].0.marks.switch_values().count();
         self.lanes.end_chunk(key, registers, rows.iter().map(|row| row.1));
     }
 }

@@ -176,7 +176,7 @@ impl EquationTable {
         self.sources.resize(first_source + compiled.variables - 2, VariableSource::Fixed(0.0));
         let integrated = rates(clause, state.numeric_only);
         let first_switch = self.switches.len();
-        self.switches.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
+        self.switches.extend(state.marks.switch_values());
         // Births stand elsewhere in memory.
         let birth = if clause.stepping.is_aged() { world.tree.birth(id) } else { self.start };
         self.rows.push(EquationRow {

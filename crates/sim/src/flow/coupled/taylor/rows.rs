@@ -208,7 +208,7 @@ impl Rows {
         (rule, solve): (&Rule, usize),
     ) -> Option<()> {
         self.variables.clear();
-        self.variables.resize(rule.variables + state.switches.len(), 0.0);
+        self.variables.resize(rule.variables + rule.solves[solve].switches.len(), 0.0);
         for source in &clause.sources {
             match *source {
                 Source::Parameter(read) => {
@@ -220,7 +220,7 @@ impl Rows {
                     self.variables[read.variable] = all.world.tree.parameters(module)[read.parameter];
                 }
                 Source::Switch(variable, switch) => {
-                    self.variables[variable] = f64::from(u8::from(state.switches[switch]));
+                    self.variables[variable] = state.marks.switch_values().nth(switch)?;
                 }
             }
         }
