@@ -69,7 +69,7 @@ impl EventStage<'_, '_> {
             return None;
         }
         // The next event, or the end of the searched stretch, is mostly far away.
-        let known = match (&state.next.kind, &self.world.coupled, &state.step) {
+        let known = match (&state.next.kind, &self.world.coupled, state.trajectories.step()) {
             (NextKind::Event, ..) => state.next.touched()[0].time,
             (_, Some(solution), _) if state.coupled => solution.end,
             (_, _, Some(step)) => step.dense.end,

@@ -188,7 +188,7 @@ impl FlowStage<'_, '_> {
     pub(super) fn keep_step(&mut self, id: ModuleId, at: SimTime) {
         let Some(state) = self.world.state(id) else { return };
         let is_plain = matches!(state.next.kind, NextKind::Event | NextKind::Window);
-        if let Some(step) = state.step.as_ref().filter(|_| is_plain) {
+        if let Some(step) = state.trajectories.step().filter(|_| is_plain) {
             self.flows.known_steps.keep(step, &state.next, at);
         }
     }

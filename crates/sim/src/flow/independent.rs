@@ -289,7 +289,7 @@ impl FlowStage<'_, '_> {
         let state = self.world.state(id).expect("a module with a rule");
         let solve = state.solve.get().expect("has equations");
         let hint = self.flows.hints[self.world.tree.kind(id).index()][solve];
-        let last = state.step.as_ref();
+        let last = state.trajectories.step();
         let (mut control, number, hurdle) = match last {
             Some(s) if s.solve == solve => (s.control, s.number + 1, s.hurdle),
             Some(s) if s.live => (s.control, 0, hint.hurdle),
@@ -342,7 +342,7 @@ impl FlowStage<'_, '_> {
         let state = self.world.state_mut(id).expect("a module with a rule");
         let solve = state.solve.get().expect("has equations");
         let Made { dense, control, number, hurdle } = made;
-        let crawling = match &mut state.step {
+        let crawling = match state.trajectories.step_mut() {
             Some(step) => {
                 if !step.live {
                     (step.mark, step.since_mark) = (from, 0);
@@ -354,7 +354,7 @@ impl FlowStage<'_, '_> {
                 (step.number, step.hurdle) = (number, hurdle);
                 crawls(&mut step.mark, &mut step.since_mark, from)
             }
-            step => {
+            None => {
                 let (begun, mark, since_mark, first) = (from, from, 0, control.size);
                 let step_made = Step {
                     dense,
@@ -368,7 +368,7 @@ impl FlowStage<'_, '_> {
                     mark,
                     since_mark,
                 };
-                *step = Some(Box::new(step_made));
+                state.trajectories.begin_steps(step_made);
                 false
             }
         };
@@ -396,7 +396,7 @@ impl FlowStage<'_, '_> {
         let mut system = Independent::new(self.world, state, rule, from, variables, scratch, &mut y);
         let integrator = &mut self.flows.independent;
         // A step that begins at the end of the module's last one need not evaluate its rates again.
-        let last = state.step.as_ref().filter(|s| s.live);
+        let last = state.trajectories.step().filter(|s| s.live);
         if last.is_some_and(|s| self.flows.independent_last == Some((id, s.dense.end)))
             && y.len() == integrator.size()
         {
@@ -448,7 +448,7 @@ impl FlowStage<'_, '_> {
     pub fn learn(&mut self, id: ModuleId) {
         let (now, kind) = (self.instant.at, self.world.tree.kind(id).index());
         let Some(state) = self.world.state_mut(id) else { return };
-        let (Some(solve), Some(step)) = (state.solve.get(), &mut state.step) else { return };
+        let (Some(solve), Some(step)) = (state.solve.get(), state.trajectories.step_mut()) else { return };
         if step.live {
             let control = &mut step.control;
             control.foresee(control.last_error, now.since(step.dense.start), now.resolution());

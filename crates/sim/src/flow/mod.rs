@@ -95,7 +95,8 @@ impl Flows {
     /// The estimated error now of integrated values that a module reads, relative; 0 where nothing is integrated.
     pub fn error_of(&self, world: &World, id: ModuleId) -> f64 {
         let Some(state) = world.state(id) else { return 0.0 };
-        let own = state.step.as_ref().filter(|_| state.is_numeric()).map_or(0.0, |step| step.dense.error);
+        let step = state.trajectories.step().filter(|_| state.is_numeric());
+        let own = step.map_or(0.0, |step| step.dense.error);
         let common = if world.coupled.is_some() { self.coupled.control.error } else { 0.0 };
         own.max(common)
     }
@@ -156,7 +157,7 @@ impl FlowStage<'_, '_> {
         };
         if !numeric_only && solve.is_all_numeric() {
             let numeric = solve.numeric.iter().map(|position| solve.of[*position]);
-            self.begin_anew(id, false).step(rule.parameters.len(), numeric);
+            self.begin_anew(id, false).follow_step(rule.parameters.len(), numeric);
             return;
         }
         let mut trajectories = std::mem::take(&mut self.flows.trajectories);
@@ -191,7 +192,7 @@ impl FlowStage<'_, '_> {
         state.since = now;
         state.numeric_only = numeric_only;
         state.horizon = f64::NAN;
-        if let Some(step) = &mut state.step {
+        if let Some(step) = state.trajectories.step_mut() {
             step.live = false;
         }
         &mut state.trajectories
@@ -242,7 +243,7 @@ impl FlowStage<'_, '_> {
         let (kind, at) = match found.event {
             Some(_) if found.in_doubt => (NextKind::Doubt, found.touched[0].time),
             Some(_) => (NextKind::Event, found.touched[0].time),
-            None if numeric => (NextKind::Window, state.step.as_ref().map_or(from, |s| s.dense.end)),
+            None if numeric => (NextKind::Window, state.trajectories.step().map_or(from, |s| s.dense.end)),
             None if limit.is_finite() => (NextKind::Window, from.after(h)),
             None => (NextKind::Nothing, from),
         };
@@ -313,7 +314,7 @@ impl FlowStage<'_, '_> {
         let ends: SmallVec<[(usize, f64); 4]> = (state.trajectories.iter().enumerate())
             .filter_map(|(parameter, law)| match law {
                 Law::Step(c) => {
-                    let dense: &Dense = &state.step.as_ref()?.dense;
+                    let dense: &Dense = &state.trajectories.step()?.dense;
                     Some((first + parameter, dense.value(c as usize, dense.position(at))))
                 }
                 _ => None,

@@ -56,7 +56,7 @@ impl<'c> Course<'c> {
             let first = resting.len();
             resting.extend_from_slice(world.tree.parameters(id));
             let Some(other) = world.state(id) else { continue };
-            let own = step.filter(|_| id == state.id).or(other.step.as_ref().map(|step| &step.dense));
+            let own = step.filter(|_| id == state.id).or(other.trajectories.step().map(|step| &step.dense));
             for (parameter, law) in other.trajectories.iter().enumerate() {
                 let motion = match law {
                     Law::Rest => None,

@@ -1,6 +1,6 @@
 //! The signs and the switches of a module, together in 16 bytes: most modules have few of both, and there are millions of modules.
 
-use super::state::Switches;
+use super::state::{Signs, Switches};
 use dlsys_expr::Sign;
 
 /// So many stand in place.
@@ -87,7 +87,7 @@ impl Marks {
         match &mut self.0 {
             Kept::Few { switches, .. } if new.is_empty() => *switches = 0,
             _ => {
-                let signs: super::state::Signs = self.signs().iter().copied().collect();
+                let signs = Signs::from(self.signs());
                 self.set(&signs, new);
             }
         }

@@ -124,7 +124,7 @@ impl World {
     fn moved(&self, state: &State, law: Law, x: f64, at: SimTime) -> f64 {
         match law {
             Law::Rest => x,
-            Law::Step(component) => match state.step.as_ref().filter(|s| s.live) {
+            Law::Step(component) => match state.trajectories.step().filter(|s| s.live) {
                 Some(step) => step.dense.value(component as usize, step.dense.position(at)),
                 None => x,
             },

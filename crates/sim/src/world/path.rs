@@ -60,7 +60,7 @@ impl<'p> Path<'p> {
         match law {
             Law::Step(c) => {
                 let own = self.step.filter(|_| state.id == self.state.id);
-                let dense = own.or(state.step.as_ref().map(|step| &step.dense))?;
+                let dense = own.or(state.trajectories.step().map(|step| &step.dense))?;
                 Some(DenseComponent::new(dense, c as usize, self.start, self.h))
             }
             Law::Coupled(c) => self.world.coupled.as_ref()?.piece(c as usize, self.start, self.h),
@@ -296,7 +296,7 @@ impl<'p> Path<'p> {
         let error = |state: &State| {
             let of = |law: Law| match law {
                 Law::Coupled(_) => solution,
-                Law::Step(_) => state.step.as_ref().map_or(0.0, |step| step.dense.error),
+                Law::Step(_) => state.trajectories.step().map_or(0.0, |step| step.dense.error),
                 Law::Rest | Law::Formula(_) => 0.0,
             };
             state.trajectories.iter().map(of).fold(0.0, f64::max)

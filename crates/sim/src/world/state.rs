@@ -30,10 +30,8 @@ pub struct State {
     pub marks: Marks,
     /// When the trajectories began; the values in the tree are those of then.
     pub since: SimTime,
-    /// How each parameter moves.
+    /// How each parameter moves, and the module's own step.
     pub trajectories: Trajectories,
-    /// The module's own step, if it is integrated alone.
-    pub step: Option<Box<Step>>,
     /// How far formulas have been looked at; NaN if they have not. Of a coupled module, the time before which none of them meets a level, which every
     /// step of its neighbours asks for; infinitely early if that is not known. Of any other, the length of the last stretch that was searched.
     pub horizon: f64,
@@ -326,7 +324,6 @@ impl State {
             marks: Marks::default(),
             since: SimTime::ZERO,
             trajectories: Trajectories::default(),
-            step: None,
             horizon: f64::NAN,
             numeric_only: false,
             coupled: false,
@@ -343,7 +340,8 @@ impl State {
         (self.id, self.is_alive) = (id, true);
         self.context.clear();
         self.marks.set_switches(&[]);
-        (self.step, self.open) = (None, None);
+        self.trajectories.end_steps();
+        self.open = None;
         self.next.clear();
         self.horizon = f64::NAN;
         (self.numeric_only, self.coupled) = (false, false);

@@ -1,9 +1,10 @@
-//! How the parameters of one module move, in the room of one formula and eight bytes.
+//! How the parameters of one module move, in the room of one formula and eight bytes; the module's own step, if it is integrated alone.
 //!
 //! Of the parameters of most modules that read others, one at most follows a formula; the others rest, or are components of dense output,
 //! the numbers of which follow one another. There are millions of such modules, so that is all that is kept of them.
 
 use crate::trajectory::Trajectory;
+use crate::world::state::Step;
 
 /// How a parameter moves: a [`Trajectory`] as it is read.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +51,15 @@ pub struct Trajectories(Kept);
 enum Kept {
     Few(Few),
     Many(Box<[Trajectory]>),
+    /// Modules that are integrated together have none, and there are more of those.
+    Own(Box<Own>),
+}
+
+/// Those of a module that has made steps of its own, and the last of these.
+#[derive(Clone, Debug)]
+struct Own {
+    all: Trajectories,
+    step: Step,
 }
 
 /// So many parameters are kept without a list.
@@ -151,6 +161,7 @@ impl Trajectories {
         match &self.0 {
             Kept::Few(few) => few.get(parameter),
             Kept::Many(all) => all.get(parameter).map(Law::of),
+            Kept::Own(own) => own.all.get(parameter),
         }
     }
 
@@ -168,14 +179,45 @@ impl Trajectories {
         })
     }
 
+    /// The module's last own step.
+    #[inline]
+    pub fn step(&self) -> Option<&Step> {
+        match &self.0 {
+            Kept::Own(own) => Some(&own.step),
+            Kept::Few(_) | Kept::Many(_) => None,
+        }
+    }
+
+    #[inline]
+    pub fn step_mut(&mut self) -> Option<&mut Step> {
+        match &mut self.0 {
+            Kept::Own(own) => Some(&mut own.step),
+            Kept::Few(_) | Kept::Many(_) => None,
+        }
+    }
+
+    /// Keeps the first own step of a module.
+    pub fn begin_steps(&mut self, step: Step) {
+        let all = std::mem::take(self);
+        self.0 = Kept::Own(Box::new(Own { all, step }));
+    }
+
+    /// Forgets the step.
+    pub fn end_steps(&mut self) {
+        if let Kept::Own(own) = &mut self.0 {
+            *self = std::mem::take(&mut own.all);
+        }
+    }
+
     /// Puts others in the place of all.
     pub fn assign(&mut self, all: impl ExactSizeIterator<Item = Trajectory>) {
         // The memory of a list is used again.
         match &mut self.0 {
+            Kept::Own(own) => own.all.assign(all),
             Kept::Many(kept) if kept.len() == all.len() => {
                 kept.iter_mut().zip(all).for_each(|(kept, new)| *kept = new)
             }
-            _ => {
+            Kept::Few(_) | Kept::Many(_) => {
                 *self = Trajectories::default();
                 all.enumerate().for_each(|(parameter, trajectory)| self.set(parameter, trajectory));
             }
@@ -183,9 +225,8 @@ impl Trajectories {
     }
 
     /// Makes some of so many parameters components of the module's own step, in this order, and lets the others rest.
-    pub fn step(&mut self, count: usize, numeric: impl Iterator<Item = usize>) {
-        *self = Trajectories::default();
-        (0..count).for_each(|parameter| self.set(parameter, Trajectory::Rest));
+    pub fn follow_step(&mut self, count: usize, numeric: impl Iterator<Item = usize>) {
+        self.assign((0..count).map(|_| Trajectory::Rest));
         for (parameter, component) in numeric.zip(0..) {
             self.set(parameter, Trajectory::Step(component));
         }
@@ -199,6 +240,7 @@ impl Trajectories {
                 few.how.iter_mut().filter(|how| **how != NOTHING).for_each(|how| *how = RESTS);
             }
             Kept::Many(all) => all.fill_with(Trajectory::default),
+            Kept::Own(own) => own.all.rest(),
         }
     }
 
@@ -223,6 +265,7 @@ impl Trajectories {
                 return;
             }
             Kept::Many(_) => trajectory,
+            Kept::Own(own) => return own.all.set(parameter, trajectory),
         };
         self.list(parameter, refused);
     }
@@ -233,6 +276,7 @@ impl Trajectories {
         let mut all = match std::mem::take(self).0 {
             Kept::Few(few) => few.into_list(),
             Kept::Many(all) => all.into_vec(),
+            Kept::Own(_) => unreachable!("the trajectories beside a step are set themselves"),
         };
         all.resize_with(all.len().max(parameter + 1), Trajectory::default);
         all[parameter] = trajectory;
@@ -243,6 +287,9 @@ impl Trajectories {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::world::state::Control;
+    use dlsys_ode::Dense;
+    use dlsys_tree::SimTime;
 
     /// The same as trajectories, formulas by their first coefficient.
     fn read(all: &Trajectories) -> Vec<(char, f64)> {
@@ -295,6 +342,36 @@ mod tests {
             all.assign([formula(4.0)].into_iter());
             assert_eq!(read(&all), [('f', 4.0)]);
         }
+    }
+
+    #[test]
+    fn a_step_stands_beside_any_of_them() {
+        let step = |number| Step {
+            dense: Dense::new(SimTime::ZERO, None, 1.0, 0, vec![1.0]),
+            control: Control::default(),
+            solve: 0,
+            begun: SimTime::ZERO,
+            first: 0.0,
+            number,
+            hurdle: None,
+            live: true,
+            mark: SimTime::ZERO,
+            since_mark: 0,
+        };
+        let mut all = Trajectories::default();
+        all.follow_step(3, [2, 0].into_iter());
+        let wanted = [('s', 1.0), ('r', 0.0), ('s', 0.0)];
+        assert!(read(&all) == wanted && all.step().is_none());
+        all.begin_steps(step(7));
+        all.step_mut().expect("it has one").number += 1;
+        assert_eq!((&read(&all)[..], all.step().map(|step| step.number)), (&wanted[..], Some(8)));
+        all.assign([formula(1.0), formula(2.0)].into_iter());
+        all.couple(&[0], 5);
+        all.assign([Trajectory::Rest, formula(3.0)].into_iter());
+        assert!(all.step().is_some());
+        all.end_steps();
+        all.end_steps();
+        assert!(read(&all) == [('r', 0.0), ('f', 3.0)] && all.step().is_none());
     }
 
     #[test]

@@ -246,7 +246,7 @@ fn present(state: &State, parameter: usize, solution: Option<&CoupledSolution>, 
     match state.trajectories.get(parameter)? {
         Law::Coupled(component) => solution.and_then(|c| c.value(component as usize, at)),
         Law::Step(component) => {
-            let step = state.step.as_ref().filter(|step| step.live);
+            let step = state.trajectories.step().filter(|step| step.live);
             step.map(|step| step.dense.value(component as usize, step.dense.position(at)))
         }
         _ => None,

@@ -16,7 +16,7 @@ pub use rows::Members;
 use crate::world::coupled_solution::CoupledSolution;
 use dlsys_ode::{Dense, Economized, LEAST_DEGREE, MAX_DEGREE, MAX_POWER, economy_error};
 use dlsys_tree::SimTime;
-use rows::{Clauses, Rows};
+use rows::{Clauses, MANY, Rows};
 use smallvec::SmallVec;
 
 /// The part of the tolerated error of a step up to which the bound is let: estimates of pairs are far above their errors, the bound is
@@ -43,9 +43,6 @@ const LEFT: f64 = 0.5;
 const MOST_HALVINGS: usize = 3;
 /// More pieces than this up to the end of the common step take longer than steps of a pair.
 const MOST_PIECES: usize = 8;
-/// The memory of smaller systems is kept, and holds all powers: it stays in the caches. Of larger ones, powers are computed once more when
-/// the degree is known: twenty numbers a component would be the most that a large tissue takes.
-const MANY: usize = 4096;
 
 /// Equations, and the memory for their Taylor coefficients.
 #[derive(Clone, Debug, Default)]
@@ -215,8 +212,12 @@ impl Taylor {
         if n <= MANY {
             economized.add(&self.powers[..powers * n], n);
         }
+        if n <= MANY && n == components {
+            return economized;
+        }
         let mut factor = 1.0;
         for power in 0..powers {
+            // Twenty numbers a component would be the most that a large tissue takes: its powers are made once more.
             if n > MANY && power > 1 {
                 self.differentiate(power, room);
             }
@@ -231,11 +232,13 @@ impl Taylor {
     }
 
     /// Where the coefficients of a power stand. Of many rows, those of the first two are kept, and of the others two at a time.
+    #[inline]
     fn place(&self, power: usize) -> usize {
         if self.rows.y.len() > MANY && power > 1 { 2 + power % 2 } else { power }
     }
 
     /// Makes the coefficients of a power from those of the one before; see [`Rows::differentiate`].
+    #[inline]
     fn differentiate(&mut self, power: usize, room: f64) -> [f64; 2] {
         let n = self.rows.y.len();
         let [last, next] = [power - 1, power].map(|power| self.place(power) * n);
@@ -244,8 +247,11 @@ impl Taylor {
             let least = if n > MANY { 4 } else { LEAST_DEGREE + 1 };
             self.powers.resize(next.max((least - 1) * n) + n, 0.0);
         }
-        let [last, next] =
-            self.powers.get_disjoint_mut([last..last + n, next..next + n]).expect("two powers");
+        let (low, high) = self.powers.split_at_mut(last.max(next));
+        let (last, next) = match last < next {
+            true => (&low[last..last + n], &mut high[..n]),
+            false => (&high[..n], &mut low[next..next + n]),
+        };
         self.products += n as u64;
         self.rows.differentiate(power - 1, last, next, room)
     }

@@ -13,6 +13,8 @@ use dlsys_ode::MAX_DEGREE;
 use dlsys_tree::{ModuleId, SimTime};
 use std::ops::Range;
 
+/// The memory of smaller systems is kept, and holds all there is of each row and each power: it stays in the caches.
+pub const MANY: usize = 4096;
 /// A formula, and coefficients, are looked for among so many that were met last: neighbours in the string read the same, and have the
 /// same equations.
 const RECENT: usize = 4;
@@ -51,15 +53,10 @@ pub struct Input {
     pub powers: [f64; MAX_DEGREE + 1],
 }
 
-/// A row of A: no loop is needed over its entries, of which those that are not there are zero.
-#[derive(Clone, Copy, Debug)]
-struct Row {
-    columns: [u32; SIDE_BY_SIDE],
-    /// The number of its coefficients among those of all rows: most modules share them, and memory is what limits large tissues.
-    coefficients: u32,
-}
+/// The columns of a row of A: no loop is needed over its entries, of which those that are not there are zero.
+type Columns = [u32; SIDE_BY_SIDE];
 
-/// The numbers of a row, which may be those of many.
+/// The numbers of a row.
 #[derive(Clone, Copy, Debug, Default)]
 struct Coefficients {
     values: [f64; SIDE_BY_SIDE],
@@ -67,9 +64,13 @@ struct Coefficients {
 }
 
 impl Coefficients {
-    fn bits(&self) -> [u64; SIDE_BY_SIDE + 1] {
+    /// True if the others are the same, to the last bit.
+    #[inline]
+    fn are(&self, others: &Coefficients) -> bool {
+        let is = |a: f64, b: f64| a.to_bits() == b.to_bits();
         let [a, b, c] = self.values;
-        [a, b, c, self.constant].map(f64::to_bits)
+        let [of_a, of_b, of_c] = others.values;
+        is(b, of_b) && is(a, of_a) && is(c, of_c) && is(self.constant, others.constant)
     }
 }
 
@@ -77,7 +78,7 @@ impl Coefficients {
 struct Draft {
     row: u32,
     count: usize,
-    columns: [u32; SIDE_BY_SIDE],
+    columns: Columns,
     coefficients: Coefficients,
 }
 
@@ -114,9 +115,11 @@ pub type Clauses = Vec<Vec<Option<Option<LinearClause>>>>;
 /// The rows of A, those of closed forms last, and what else is in the equations.
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
-    rows: Vec<Row>,
-    /// The coefficients of the rows.
-    shared: Vec<Coefficients>,
+    rows: Vec<Columns>,
+    coefficients: Vec<Coefficients>,
+    /// By row, of many: the number of its coefficients. Most modules share them, and memory is what limits large tissues. Of few rows, each
+    /// has its own.
+    shared: Vec<u32>,
     /// Entries that the rows have no room for: row, column and value.
     others: Vec<(u32, u32, f64)>,
     /// What is read from outside.
@@ -127,7 +130,7 @@ pub struct Rows {
     links: Vec<(f64, Option<f64>)>,
     /// The variables of a module, its coefficients, and registers.
     variables: Vec<f64>,
-    coefficients: Vec<f64>,
+    evaluated: Vec<f64>,
     scratch: Scratch<f64>,
     /// The values of all rows: at first those at the start.
     pub y: Vec<f64>,
@@ -141,9 +144,10 @@ impl Rows {
     /// Writes the equations of modules, given the values of their components; None if some are not linear with constant coefficients.
     pub fn write(&mut self, clauses: &mut Clauses, all: Members, y: &[f64], now: SimTime) -> Option<()> {
         let Members { world, rules, .. } = all;
-        let Rows { rows, shared, others, inputs, formulas, links, .. } = self;
+        let Rows { rows, coefficients, shared, others, inputs, formulas, links, .. } = self;
         rows.clear();
         others.clear();
+        coefficients.clear();
         shared.clear();
         inputs.clear();
         formulas.clear();
@@ -190,11 +194,10 @@ impl Rows {
             return None;
         }
         let sum = |of: &Coefficients| of.values.iter().map(|a| a.abs()).sum::<f64>();
-        self.norm = self.shared.iter().map(sum).fold(0.0, f64::max);
+        self.norm = self.coefficients.iter().map(sum).fold(0.0, f64::max);
         for others in self.others.chunk_by(|a, b| a.0 == b.0) {
             let more: f64 = others.iter().map(|other| other.2.abs()).sum();
-            let row = self.rows[others[0].0 as usize];
-            self.norm = self.norm.max(sum(&self.shared[row.coefficients as usize]) + more);
+            self.norm = self.norm.max(sum(self.coefficients_of(others[0].0)) + more);
         }
         self.norm.is_finite().then_some(())
     }
@@ -225,8 +228,8 @@ impl Rows {
             }
         }
         let program = &rule.solves[solve].linear.as_ref()?.coefficients;
-        self.coefficients.resize(program.outputs(), 0.0);
-        program.eval(&self.variables, &mut self.scratch, &mut self.coefficients);
+        self.evaluated.resize(program.outputs(), 0.0);
+        program.eval(&self.variables, &mut self.scratch, &mut self.evaluated);
         Some(())
     }
 
@@ -241,7 +244,7 @@ impl Rows {
         now: SimTime,
     ) -> Option<()> {
         let world = all.world;
-        let constant = own.as_ref().map_or(equation.constant, |own| self.coefficients[own.start]);
+        let constant = own.as_ref().map_or(equation.constant, |own| self.evaluated[own.start]);
         let mut draft = self.begin(constant);
         let Law::Coupled(component) = state.trajectories.get(equation.parameter)? else {
             return None;
@@ -250,7 +253,7 @@ impl Rows {
             return None;
         }
         for (n, &(read, coefficient)) in equation.terms.iter().enumerate() {
-            let coefficient = own.as_ref().map_or(coefficient, |own| self.coefficients[own.start + 1 + n]);
+            let coefficient = own.as_ref().map_or(coefficient, |own| self.evaluated[own.start + 1 + n]);
             let (module, moves) = all.module(state, read);
             let place = || world.tree.places(module).start + read.parameter;
             let moves = moves.and_then(|state| Some((state, state.trajectories.get(read.parameter)?)));
@@ -309,22 +312,48 @@ impl Rows {
     }
 
     /// Ends a row.
+    #[inline]
     fn finish(&mut self, Draft { columns, coefficients, .. }: Draft) {
-        let bits = coefficients.bits();
-        let recent = self.shared.iter().enumerate().rev().take(RECENT);
-        let known = recent.into_iter().find(|known| known.1.bits() == bits).map(|known| known.0);
-        let number = known.unwrap_or_else(|| {
-            self.shared.push(coefficients);
-            self.shared.len() - 1
-        });
-        self.rows.push(Row { columns, coefficients: number as u32 });
+        self.rows.push(columns);
+        if self.components <= MANY {
+            self.coefficients.push(coefficients);
+            return;
+        }
+        let mut recent = self.coefficients.iter().enumerate().rev().take(RECENT);
+        let known = recent.find(|known| known.1.are(&coefficients)).map(|known| known.0);
+        self.shared.push(known.unwrap_or(self.coefficients.len()) as u32);
+        if known.is_none() {
+            self.coefficients.push(coefficients);
+        }
+    }
+
+    fn coefficients_of(&self, row: u32) -> &Coefficients {
+        &self.coefficients[self.shared.get(row as usize).map_or(row, |shared| *shared) as usize]
     }
 
     /// Makes the Taylor coefficients of the next power after `power`, given those of that; gives the largest of the components, and of all.
     pub fn differentiate(&self, power: usize, last: &[f64], next: &mut [f64], room: f64) -> [f64; 2] {
+        if self.shared.is_empty() {
+            return self.differentiate_by(power, last, next, room, |rows| self.coefficients[rows].iter());
+        }
+        let own = |rows: Range<usize>| {
+            self.shared[rows].iter().map(|number: &u32| &self.coefficients[*number as usize])
+        };
+        self.differentiate_by(power, last, next, room, own)
+    }
+
+    /// The same, given the coefficients of a range of rows.
+    #[inline]
+    fn differentiate_by<'c, C: Iterator<Item = &'c Coefficients>>(
+        &self,
+        power: usize,
+        last: &[f64],
+        next: &mut [f64],
+        room: f64,
+        of: impl Fn(Range<usize>) -> C,
+    ) -> [f64; 2] {
         if power == 0 {
-            let constant = |row: &Row| self.shared[row.coefficients as usize].constant;
-            next.iter_mut().zip(&self.rows).for_each(|(next, row)| *next = constant(row));
+            next.iter_mut().zip(of(0..self.rows.len())).for_each(|(next, row)| *next = row.constant);
         } else {
             next.fill(0.0);
         }
@@ -335,20 +364,26 @@ impl Rows {
             next[row as usize] += a * last[column as usize];
         }
         let factor = room / (power + 1) as f64;
-        let (components, formulas) = next.split_at_mut(self.components);
-        let (rows, others) = self.rows.split_at(self.components);
-        let size = multiply((rows, &self.shared), last, factor, components);
-        [size, size.max(multiply((others, &self.shared), last, factor, formulas))]
+        let ranges = [0..self.components, self.components..self.rows.len()];
+        let [size, others] = ranges.map(|rows| {
+            let out = &mut next[rows.clone()];
+            multiply(self.rows[rows.clone()].iter().zip(of(rows)), last, factor, out)
+        });
+        [size, size.max(others)]
     }
 }
 
 /// Adds the products of rows and a vector to what is there, multiplies it by a factor, and gives the largest.
-fn multiply((rows, shared): (&[Row], &[Coefficients]), x: &[f64], factor: f64, out: &mut [f64]) -> f64 {
+#[inline]
+fn multiply<'r, 'c>(
+    rows: impl Iterator<Item = (&'r Columns, &'c Coefficients)>,
+    x: &[f64],
+    factor: f64,
+    out: &mut [f64],
+) -> f64 {
     // Numbers that are not negative have the order of their bits.
     let mut largest = 0;
-    for (row, out) in out.iter_mut().enumerate() {
-        let Row { columns: [a, b, c], coefficients } = &rows[row];
-        let [of_a, of_b, of_c] = &shared[*coefficients as usize].values;
+    for (out, ([a, b, c], Coefficients { values: [of_a, of_b, of_c], .. })) in out.iter_mut().zip(rows) {
         let sum = *out + of_a * x[*a as usize] + of_b * x[*b as usize] + of_c * x[*c as usize];
         *out = factor * sum;
         largest = largest.max(out.abs().to_bits());
