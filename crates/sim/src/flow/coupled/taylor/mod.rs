@@ -11,12 +11,12 @@
 
 mod rows;
 
-pub use rows::Members;
+pub use rows::{MANY, Members};
 
 use crate::world::coupled_solution::CoupledSolution;
 use dlsys_ode::{Dense, Economized, LEAST_DEGREE, MAX_DEGREE, MAX_POWER, economy_error};
 use dlsys_tree::SimTime;
-use rows::{Clauses, MANY, Rows};
+use rows::{Clauses, Rows};
 use smallvec::SmallVec;
 
 /// The part of the tolerated error of a step up to which the bound is let: estimates of pairs are far above their errors, the bound is

@@ -333,27 +333,27 @@ impl Rows {
 
     /// Makes the Taylor coefficients of the next power after `power`, given those of that; gives the largest of the components, and of all.
     pub fn differentiate(&self, power: usize, last: &[f64], next: &mut [f64], room: f64) -> [f64; 2] {
-        if self.shared.is_empty() {
-            return self.differentiate_by(power, last, next, room, |rows| self.coefficients[rows].iter());
+        let all = &self.coefficients[..];
+        match self.shared.is_empty() {
+            true => self.differentiate_by(|row| &all[row], power, last, next, room),
+            false => self.differentiate_by(|row| &all[self.shared[row] as usize], power, last, next, room),
         }
-        let own = |rows: Range<usize>| {
-            self.shared[rows].iter().map(|number: &u32| &self.coefficients[*number as usize])
-        };
-        self.differentiate_by(power, last, next, room, own)
     }
 
-    /// The same, given the coefficients of a range of rows.
+    /// The same with the coefficients of each row.
     #[inline]
-    fn differentiate_by<'c, C: Iterator<Item = &'c Coefficients>>(
+    fn differentiate_by<'c>(
         &self,
+        of: impl Fn(usize) -> &'c Coefficients,
         power: usize,
         last: &[f64],
         next: &mut [f64],
         room: f64,
-        of: impl Fn(Range<usize>) -> C,
     ) -> [f64; 2] {
         if power == 0 {
-            next.iter_mut().zip(of(0..self.rows.len())).for_each(|(next, row)| *next = row.constant);
+            for (row, next) in next.iter_mut().enumerate() {
+                *next = of(row).constant;
+            }
         } else {
             next.fill(0.0);
         }
@@ -363,27 +363,29 @@ impl Rows {
         for &(row, column, a) in &self.others {
             next[row as usize] += a * last[column as usize];
         }
-        let factor = room / (power + 1) as f64;
-        let ranges = [0..self.components, self.components..self.rows.len()];
-        let [size, others] = ranges.map(|rows| {
-            let out = &mut next[rows.clone()];
-            multiply(self.rows[rows.clone()].iter().zip(of(rows)), last, factor, out)
-        });
+        let (factor, first) = (room / (power + 1) as f64, self.components);
+        let (components, formulas) = next.split_at_mut(first);
+        let (rows, others) = self.rows.split_at(first);
+        let size = multiply(rows, &of, last, factor, components);
+        let others = multiply(others, |row| of(first + row), last, factor, formulas);
         [size, size.max(others)]
     }
 }
 
-/// Adds the products of rows and a vector to what is there, multiplies it by a factor, and gives the largest.
+/// Adds the products of rows and a vector to what is there, multiplies it by a factor, and gives the largest. `of` gives the coefficients of a
+/// row.
 #[inline]
-fn multiply<'r, 'c>(
-    rows: impl Iterator<Item = (&'r Columns, &'c Coefficients)>,
+fn multiply<'c>(
+    rows: &[Columns],
+    of: impl Fn(usize) -> &'c Coefficients,
     x: &[f64],
     factor: f64,
     out: &mut [f64],
 ) -> f64 {
     // Numbers that are not negative have the order of their bits.
     let mut largest = 0;
-    for (out, ([a, b, c], Coefficients { values: [of_a, of_b, of_c], .. })) in out.iter_mut().zip(rows) {
+    for (row, out) in out.iter_mut().enumerate() {
+        let ([a, b, c], [of_a, of_b, of_c]) = (&rows[row], &of(row).values);
         let sum = *out + of_a * x[*a as usize] + of_b * x[*b as usize] + of_c * x[*c as usize];
         *out = factor * sum;
         largest = largest.max(out.abs().to_bits());
