@@ -112,6 +112,10 @@ impl Economized {
         Economized { degree, power: 0, factor: 1.0, shorter, coefficients }
     }
 
+    pub fn degree(&self) -> usize {
+        self.degree
+    }
+
     /// Adds the coefficients of the next powers of the position, from 0 on up to at most [`MAX_POWER`]: of one for all components, `stride`
     /// numbers behind of the next, and so on.
     pub fn add(&mut self, powers: &[f64], stride: usize) {
@@ -175,7 +179,9 @@ impl<const N: usize> Kernel for Write<'_, N> {
 mod tests {
     use super::*;
 
-    const ENDS: (SimTime, SimTime, f64) = (SimTime::ZERO, SimTime::new(1.0), 1.0);
+    fn ends() -> (SimTime, SimTime, f64) {
+        (SimTime::ZERO, SimTime::new(1.0), 1.0)
+    }
 
     #[test]
     fn an_exponential_is_as_near_as_the_error_says_and_exact_at_its_ends() {
@@ -195,7 +201,7 @@ mod tests {
             let (some, others) = double.split_at(6);
             economized.add(some, 2);
             others.chunks(2).for_each(|power| economized.add(power, 2));
-            let dense = economized.dense(ENDS);
+            let dense = economized.dense(ends());
             let sizes: Vec<f64> = powers.iter().map(|c| c.abs()).collect();
             let error = economy_error(degree, &sizes);
             assert!(error < best, "degree {degree}: {error}");
@@ -216,7 +222,7 @@ mod tests {
         for degree in LEAST_DEGREE..=MAX_DEGREE {
             let mut economized = Economized::new(degree, 1, 1.0);
             economized.add(&powers, 1);
-            let dense = economized.dense(ENDS);
+            let dense = economized.dense(ends());
             assert_eq!(economy_error(degree, &powers.map(f64::abs)), 0.0);
             for n in 0..=10 {
                 let s = f64::from(n) / 10.0;

@@ -128,6 +128,25 @@ impl Few {
         Ok(())
     }
 
+    /// Makes some parameters components of the coupled modules; false if others stand in the way.
+    #[inline]
+    fn couple(&mut self, parameters: &[usize], first: u32) -> bool {
+        let mut how = self.how;
+        for (&parameter, number) in parameters.iter().zip(COUPLED..) {
+            match how.get_mut(parameter) {
+                Some(how) if *how != FORMULA => *how = number,
+                _ => return false,
+            }
+        }
+        // The numbers of others are counted from another one.
+        let is_other = |place| (COUPLED..STEP).contains(&how[place]) && !parameters.contains(&place);
+        if (0..FEW).any(is_other) {
+            return false;
+        }
+        (self.how, self.first) = (how, first);
+        true
+    }
+
     /// The trajectories one by one.
     fn into_list(mut self) -> Vec<Trajectory> {
         let mut all = Vec::with_capacity(FEW);
@@ -246,6 +265,11 @@ impl Trajectories {
 
     /// Makes some parameters components of the coupled modules, with numbers in this order from one on.
     pub fn couple(&mut self, parameters: &[usize], first: u32) {
+        if let Kept::Few(few) = &mut self.0
+            && few.couple(parameters, first)
+        {
+            return;
+        }
         // Before any of them has a new number, so that all have room beside each other.
         parameters.iter().for_each(|parameter| self.set(*parameter, Trajectory::Rest));
         for (&parameter, component) in parameters.iter().zip(first..) {

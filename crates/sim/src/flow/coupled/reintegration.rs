@@ -30,8 +30,9 @@ use crate::detect::examined::{Stages, StagesOfSteps};
 use crate::flow::FlowStage;
 use crate::flow::coupled::columns::{Numbers, Whole};
 use crate::flow::coupled::equations::{Equations, RateWorkspace};
+use crate::flow::coupled::lanes::LaneBatches;
 use crate::flow::coupled::system::{Membership, System, integrated};
-use crate::flow::coupled::taylor::{LOOSEST, Members, Taylor};
+use crate::flow::coupled::taylor::{LOOSEST, MANY, Members, Taylor};
 use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator, StepRequest};
 use crate::schedule::Owner;
 use crate::world::coupled_solution::{CoupledSolution, value_of};
@@ -497,7 +498,12 @@ impl FlowStage<'_, '_> {
         let all = self.flows.coupled.system.table.places.len();
         let solution: &mut CoupledSolution = self.world.coupled.as_mut().expect("seen above");
         solution.replace(&mut trial.stretches, &trial.components, all);
-        self.flows.coupled.reintegrated = true;
+        let coupled = &mut self.flows.coupled;
+        let is_first = !std::mem::replace(&mut coupled.reintegrated, true);
+        if is_first && !coupled.pending && coupled.members.len() > MANY {
+            // The next step has other equations.
+            coupled.system.lanes = LaneBatches::default();
+        }
         let tolerance = self.setup.coupled_settings.tolerance;
         let known = &mut self.flows.coupled.control.error;
         *known = (*known + INNER_TOLERANCE * tolerance).min(CERTAINTY * tolerance);

@@ -74,14 +74,6 @@ impl Coefficients {
     }
 }
 
-/// A row that is being written.
-struct Draft {
-    row: u32,
-    count: usize,
-    columns: Columns,
-    coefficients: Coefficients,
-}
-
 /// Modules whose equations are solved together, in the order of their components.
 #[derive(Clone, Copy)]
 pub struct Members<'r> {
@@ -182,13 +174,12 @@ impl Rows {
         }
         for n in 0..self.links.len() {
             let (decay, inflow) = self.links[n];
-            let mut draft = self.begin(inflow.unwrap_or(0.0));
-            let row = draft.row;
-            self.add(&mut draft, (row, decay));
+            let (row, mut count) = (self.begin(inflow.unwrap_or(0.0)), 0);
+            self.add(row, &mut count, (row, decay));
             if inflow.is_none() {
-                self.add(&mut draft, (row + 1, 1.0));
+                self.add(row, &mut count, (row + 1, 1.0));
             }
-            self.finish(draft);
+            self.finish();
         }
         if self.rows.len() != self.y.len() {
             return None;
@@ -245,11 +236,11 @@ impl Rows {
     ) -> Option<()> {
         let world = all.world;
         let constant = own.as_ref().map_or(equation.constant, |own| self.evaluated[own.start]);
-        let mut draft = self.begin(constant);
+        let (row, mut count) = (self.begin(constant), 0);
         let Law::Coupled(component) = state.trajectories.get(equation.parameter)? else {
             return None;
         };
-        if all.number(component) != Some(draft.row) {
+        if all.number(component) != Some(row) {
             return None;
         }
         for (n, &(read, coefficient)) in equation.terms.iter().enumerate() {
@@ -259,22 +250,23 @@ impl Rows {
             let moves = moves.and_then(|state| Some((state, state.trajectories.get(read.parameter)?)));
             match moves {
                 None | Some((_, Law::Rest | Law::Step(_))) => {
-                    draft.coefficients.constant += coefficient * world.tree.values()[place()];
+                    let more = coefficient * world.tree.values()[place()];
+                    self.coefficients.last_mut().expect("the row has been begun").constant += more;
                 }
                 Some((_, Law::Coupled(component))) => match all.number(component) {
-                    Some(column) => self.add(&mut draft, (column, coefficient)),
+                    Some(column) => self.add(row, &mut count, (column, coefficient)),
                     None => {
-                        let (row, powers) = (draft.row, [0.0; MAX_DEGREE + 1]);
+                        let powers = [0.0; MAX_DEGREE + 1];
                         self.inputs.push(Input { row, component, coefficient, powers });
                     }
                 },
                 Some((of, Law::Formula(trajectory))) => {
                     let column = self.formula(trajectory, place(), world, now.since(of.since))?;
-                    self.add(&mut draft, (column, coefficient));
+                    self.add(row, &mut count, (column, coefficient));
                 }
             }
         }
-        self.finish(draft);
+        self.finish();
         Some(())
     }
 
@@ -293,37 +285,41 @@ impl Rows {
         Some(row)
     }
 
-    /// Begins the next row with its constant.
-    fn begin(&self, constant: f64) -> Draft {
-        let coefficients = Coefficients { constant, ..Coefficients::default() };
-        Draft { row: self.rows.len() as u32, count: 0, columns: [0; SIDE_BY_SIDE], coefficients }
+    /// Begins the next row with its constant, and gives its number.
+    fn begin(&mut self, constant: f64) -> u32 {
+        self.rows.push(Columns::default());
+        self.coefficients.push(Coefficients { constant, ..Coefficients::default() });
+        self.rows.len() as u32 - 1
     }
 
-    /// Adds an entry, by column and value, to a row.
+    /// Adds an entry, by column and value, to the row that was begun last, which has so many.
     #[inline]
-    fn add(&mut self, draft: &mut Draft, (column, value): (u32, f64)) {
-        let Draft { row, count, columns, coefficients } = draft;
-        if *count < SIDE_BY_SIDE {
-            (columns[*count], coefficients.values[*count]) = (column, value);
-            *count += 1;
-        } else {
-            self.others.push((*row, column, value));
+    fn add(&mut self, row: u32, count: &mut usize, (column, value): (u32, f64)) {
+        match self.coefficients.last_mut() {
+            Some(last) if *count < SIDE_BY_SIDE => {
+                (self.rows[row as usize][*count], last.values[*count]) = (column, value);
+                *count += 1;
+            }
+            _ => self.others.push((row, column, value)),
         }
     }
 
-    /// Ends a row.
+    /// Ends the row that was begun last.
     #[inline]
-    fn finish(&mut self, Draft { columns, coefficients, .. }: Draft) {
-        self.rows.push(columns);
-        if self.components <= MANY {
-            self.coefficients.push(coefficients);
-            return;
+    fn finish(&mut self) {
+        if self.components > MANY {
+            self.share();
         }
+    }
+
+    /// Lets it have the coefficients of an earlier row, if that has the same.
+    fn share(&mut self) {
+        let Some(own) = self.coefficients.pop() else { return };
         let mut recent = self.coefficients.iter().enumerate().rev().take(RECENT);
-        let known = recent.find(|known| known.1.are(&coefficients)).map(|known| known.0);
+        let known = recent.find(|known| known.1.are(&own)).map(|known| known.0);
         self.shared.push(known.unwrap_or(self.coefficients.len()) as u32);
         if known.is_none() {
-            self.coefficients.push(coefficients);
+            self.coefficients.push(own);
         }
     }
 
@@ -438,4 +434,42 @@ fn linear_clause(rule: &Rule, solve: usize) -> Option<LinearClause> {
     });
     let equations: Option<Box<[LinearEquation]>> = equations.collect();
     Some(LinearClause { equations: equations?, sources: sources? })
+}
+
+#[cfg(test)]
+impl Rows {
+    /// Filaments that are all alike, of so many cells each, which diffuse; at one end of each is a closed form.
+    pub fn of_filaments(filaments: usize, cells: usize) -> Rows {
+        let components = filaments * cells;
+        let mut rows = Rows { components, norm: 0.16, ..Rows::default() };
+        for filament in 0..filaments {
+            let start = filament * cells;
+            rows.y.extend((0..cells).map(|cell| 120.0 + 90.0 * (cell as f64).sin()));
+            for cell in start..start + cells {
+                let (row, mut count) = (rows.begin(if cell % 7 == 0 { 0.5 } else { 0.0 }), 0);
+                let left = if cell == start { components + filament } else { cell - 1 };
+                rows.add(row, &mut count, (left as u32, 0.03));
+                rows.add(row, &mut count, (cell as u32, -0.09));
+                if cell + 1 < start + cells {
+                    rows.add(row, &mut count, (cell as u32 + 1, 0.03));
+                }
+                if cell % 5 == 2 {
+                    rows.add(row, &mut count, (cell as u32 - 2, 1e-3));
+                }
+                rows.finish();
+            }
+        }
+        for _ in 0..filaments {
+            let (row, mut count) = (rows.begin(30.0), 0);
+            rows.add(row, &mut count, (row, -0.15));
+            rows.finish();
+            rows.y.push(20.0);
+        }
+        rows
+    }
+
+    /// How many different coefficients are kept.
+    pub fn kept(&self) -> usize {
+        self.coefficients.len()
+    }
 }
