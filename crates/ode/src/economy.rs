@@ -112,10 +112,6 @@ impl Economized {
         Economized { degree, power: 0, factor: 1.0, shorter, coefficients }
     }
 
-    pub fn degree(&self) -> usize {
-        self.degree
-    }
-
     /// Adds the coefficients of the next powers of the position, from 0 on up to at most [`MAX_POWER`]: of one for all components, `stride`
     /// numbers behind of the next, and so on.
     pub fn add(&mut self, powers: &[f64], stride: usize) {

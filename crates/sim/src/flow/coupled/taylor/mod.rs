@@ -53,8 +53,6 @@ pub struct Taylor {
     powers: Vec<f64>,
     /// The ends of the closed forms, whose rows are the last.
     ends: Vec<f64>,
-    /// The degree of the last polynomials.
-    degree: usize,
     /// The length that is to be tried for the next common step; 0 before the first.
     next: f64,
     /// Products of a row and a vector so far.
@@ -71,17 +69,6 @@ struct Span<'s> {
     solution: Option<&'s CoupledSolution>,
     /// The error, relative to the values at the start or to the way that the first rates go.
     tolerance: f64,
-}
-
-/// The powers that count along a length.
-struct Raised {
-    /// The largest coefficient of the components for each power, and a bound of all that are left out together.
-    sizes: SmallVec<[f64; MAX_POWER + 1]>,
-    left_out: f64,
-    /// See [`Taylor::least_scale`].
-    scale: f64,
-    /// Of many rows: polynomials for them, of the degree that is expected.
-    economized: Option<Economized>,
 }
 
 impl Taylor {
@@ -186,7 +173,7 @@ impl Taylor {
             input.powers = dense.powers(component, dense.position(from), dense.position(end));
             input.powers.iter_mut().for_each(|power| *power *= input.coefficient);
         }
-        let Raised { sizes, left_out, scale, economized } = self.raise(room, tolerance);
+        let (sizes, left_out, scale) = self.raise(room, tolerance);
         let tolerated = tolerance * scale;
         let error = |degree: usize| (left_out + economy_error(degree, &sizes)) / tolerated;
         let degrees = LEAST_DEGREE..=MAX_DEGREE;
@@ -206,12 +193,7 @@ impl Taylor {
             (parts, error, shorter) = (parts * more, 1.0, more);
         }
         let (h, end) = cut(parts);
-        let economized = match economized.filter(|known| known.degree() == degree && shorter == 1.0) {
-            Some(known) => known,
-            None => self.economize(degree, sizes.len(), (room, shorter)),
-        };
-        self.degree = degree;
-        let mut dense = economized.dense((from, end, h));
+        let mut dense = self.economize(degree, sizes.len(), (room, shorter)).dense((from, end, h));
         dense.error = tolerance * error;
         let (of_components, of_formulas) = self.rows.y.split_at_mut(self.rows.components);
         for (component, y) in of_components.iter_mut().enumerate() {
@@ -222,47 +204,31 @@ impl Taylor {
     }
 
     /// Polynomials of a degree for those of so many powers along a length, in a piece so many times shorter; their ends, too.
+    /// Of many rows the powers are made once more: all of them would be the most that a large tissue takes.
     fn economize(&mut self, degree: usize, powers: usize, (room, shorter): (f64, f64)) -> Economized {
         let (n, components) = (self.rows.y.len(), self.rows.components);
         let mut economized = Economized::new(degree, components, shorter);
-        self.begin_ends();
+        self.ends.clear();
+        self.ends.resize(n - components, 0.0);
         if n <= MANY {
             economized.add(&self.powers[..powers * n], n);
-        }
-        if n <= MANY && n == components {
-            return economized;
+            if n == components {
+                return economized;
+            }
         }
         let mut factor = 1.0;
         for power in 0..powers {
-            if n > MANY {
-                if power > 1 {
-                    self.differentiate(power, room);
-                }
-                economized.add(self.power(power), n);
+            if n > MANY && power > 1 {
+                self.differentiate(power, room);
             }
-            self.add_to_ends(power, factor);
+            let known = &self.powers[self.place(power) * n..][..n];
+            if n > MANY {
+                economized.add(known, n);
+            }
+            self.ends.iter_mut().zip(&known[components..]).for_each(|(end, a)| *end += factor * a);
             factor /= shorter;
         }
         economized
-    }
-
-    fn begin_ends(&mut self) {
-        self.ends.clear();
-        self.ends.resize(self.rows.y.len() - self.rows.components, 0.0);
-    }
-
-    /// Adds a power, times a factor, to the ends of the closed forms.
-    fn add_to_ends(&mut self, power: usize, factor: f64) {
-        let mut ends = std::mem::take(&mut self.ends);
-        let of_formulas = &self.power(power)[self.rows.components..];
-        ends.iter_mut().zip(of_formulas).for_each(|(end, a)| *end += factor * a);
-        self.ends = ends;
-    }
-
-    /// The coefficients of a power that is kept.
-    fn power(&self, power: usize) -> &[f64] {
-        let n = self.rows.y.len();
-        &self.powers[self.place(power) * n..][..n]
     }
 
     /// Where the coefficients of a power stand. Of many rows, those of the first two are kept, and of the others two at a time.
@@ -290,40 +256,28 @@ impl Taylor {
         self.rows.differentiate(power - 1, last, next, room)
     }
 
-    /// Makes the coefficients of as many powers as count along a length.
-    fn raise(&mut self, room: f64, tolerance: f64) -> Raised {
+    /// Makes the coefficients of as many powers as count along a length: gives the largest of the components for each power, a bound of all
+    /// others together, and [`Taylor::least_scale`].
+    fn raise(&mut self, room: f64, tolerance: f64) -> (SmallVec<[f64; MAX_POWER + 1]>, f64, f64) {
         self.powers.clear();
         self.powers.extend_from_slice(&self.rows.y);
-        let (n, components) = (self.rows.y.len(), self.rows.components);
-        let (mut sizes, mut scale, mut left_out) = (SmallVec::new(), 0.0, f64::INFINITY);
-        // Mostly the degree is that of the piece before.
-        let degree = self.degree.max(LEAST_DEGREE);
-        let mut economized = (n > MANY).then(|| Economized::new(degree, components, 1.0));
-        if let Some(economized) = &mut economized {
-            economized.add(&self.powers, n);
-            self.begin_ends();
-            self.add_to_ends(0, 1.0);
-        }
+        let (mut sizes, mut scale) = (SmallVec::new(), 0.0);
         // That of the values counts nowhere.
         sizes.push(0.0);
         for power in 1..=MAX_POWER {
             let [size, all] = self.differentiate(power, room);
             sizes.push(size);
-            if let Some(economized) = &mut economized {
-                economized.add(self.power(power), n);
-                self.add_to_ends(power, 1.0);
-            }
             if power == 1 {
                 scale = self.least_scale(1.0);
             }
             if power >= LEAST_DEGREE {
-                left_out = self.left_out(power, all, room);
-                if left_out <= TAIL * tolerance * scale {
-                    break;
+                let left_out = self.left_out(power, all, room);
+                if left_out <= TAIL * tolerance * scale || power == MAX_POWER {
+                    return (sizes, left_out, scale);
                 }
             }
         }
-        Raised { sizes, left_out, scale, economized }
+        (sizes, f64::INFINITY, scale)
     }
 
     /// A bound of all terms beyond a power together, given the largest coefficient of that.
@@ -373,27 +327,23 @@ mod tests {
         let mut shorter = [0, 0];
         for (end, tolerance) in [(4.0, 1e-5), (10.0, 1e-7), (16.0, 1e-8), (16.0, 1e-12), (40.0, 1e-12)] {
             let end = SimTime::new(end);
-            let solve = |filaments: usize, degree: usize| {
+            let solve = |filaments: usize| {
                 let rows = Rows::of_filaments(filaments, CELLS);
-                let mut taylor = Taylor { rows, degree, ..Taylor::default() };
+                let mut taylor = Taylor { rows, ..Taylor::default() };
                 let span = Span { from: SimTime::ZERO, end: Some(end), solution: None, tolerance };
                 let dense = taylor.piece(span).expect("linear equations");
                 (dense, taylor)
             };
-            let (one, few) = solve(1, 0);
-            // Whatever degree is expected.
-            for degree in 0..=MAX_DEGREE {
-                let (two, many) = solve(2, degree);
-                assert_eq!((one.start, one.end, one.h, one.error), (two.start, two.end, two.h, two.error));
-                for cell in 0..CELLS {
-                    assert_eq!([two.of(cell), two.of(CELLS + cell)], [one.of(cell); 2], "cell {cell}");
-                }
-                // The ends, with those of the closed forms.
-                assert_eq!(many.rows.y[2 * CELLS..], [few.rows.y[CELLS]; 2]);
-                assert_eq!(many.rows.y[CELLS..2 * CELLS], few.rows.y[..CELLS]);
-                assert_eq!(many.powers.len(), 4 * many.rows.y.len());
-                assert!(few.rows.kept() == CELLS + 1 && many.rows.kept() < CELLS, "{}", many.rows.kept());
+            let ((one, few), (two, many)) = (solve(1), solve(2));
+            assert_eq!((one.start, one.end, one.h, one.error), (two.start, two.end, two.h, two.error));
+            for cell in 0..CELLS {
+                assert_eq!([two.of(cell), two.of(CELLS + cell)], [one.of(cell); 2], "cell {cell}");
             }
+            // The ends, with those of the closed forms.
+            assert_eq!(many.rows.y[2 * CELLS..], [few.rows.y[CELLS]; 2]);
+            assert_eq!(many.rows.y[CELLS..2 * CELLS], few.rows.y[..CELLS]);
+            assert_eq!(many.powers.len(), 4 * many.rows.y.len());
+            assert!(few.rows.kept() == CELLS + 1 && many.rows.kept() < CELLS, "{}", many.rows.kept());
             shorter[usize::from(one.end.since(end) < 0.0)] += 1;
         }
         assert!(shorter.iter().all(|count| *count > 0), "{shorter:?}");
