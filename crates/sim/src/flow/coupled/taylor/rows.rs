@@ -445,16 +445,16 @@ impl Rows {
         for filament in 0..filaments {
             let start = filament * cells;
             rows.y.extend((0..cells).map(|cell| 120.0 + 90.0 * (cell as f64).sin()));
-            for cell in start..start + cells {
+            for cell in 0..cells {
                 let (row, mut count) = (rows.begin(if cell % 7 == 0 { 0.5 } else { 0.0 }), 0);
-                let left = if cell == start { components + filament } else { cell - 1 };
+                let left = if cell == 0 { components + filament } else { start + cell - 1 };
                 rows.add(row, &mut count, (left as u32, 0.03));
-                rows.add(row, &mut count, (cell as u32, -0.09));
-                if cell + 1 < start + cells {
-                    rows.add(row, &mut count, (cell as u32 + 1, 0.03));
+                rows.add(row, &mut count, (row, -0.09));
+                if cell + 1 < cells {
+                    rows.add(row, &mut count, (row + 1, 0.03));
                 }
                 if cell % 5 == 2 {
-                    rows.add(row, &mut count, (cell as u32 - 2, 1e-3));
+                    rows.add(row, &mut count, (row - 2, 1e-3));
                 }
                 rows.finish();
             }
