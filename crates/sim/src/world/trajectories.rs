@@ -334,7 +334,8 @@ mod tests {
     fn they_are_what_was_put_in_with_room_for_all_and_without() {
         use Trajectory::{Coupled, Rest, Step};
         assert_eq!(size_of::<Trajectories>(), 48);
-        let cases: [(Vec<Trajectory>, &[(char, f64)], bool); 9] = [
+        type Case<'c> = (Vec<Trajectory>, &'c [(char, f64)], bool);
+        let cases: [Case; 9] = [
             (vec![], &[], true),
             (vec![formula(2.0), Coupled(7)], &[('f', 2.0), ('c', 7.0)], true),
             (
