@@ -92,67 +92,92 @@ pub fn economy_error(degree: usize, sizes: &[f64]) -> f64 {
     beyond.map(|power| sizes[power] * errors[power]).sum()
 }
 
-impl Dense {
-    /// A step from one instant to another, of a length, of polynomials of a degree from [`LEAST_DEGREE`] to [`MAX_DEGREE`] that stand for
-    /// those with these coefficients of the powers of the position: of the first power, 0, for all components, `stride` numbers behind of
-    /// the next, and so on up to at most [`MAX_POWER`]. The ends are those of the polynomials as they are given.
-    pub fn of_powers(
-        (start, end, h): (SimTime, SimTime, f64),
-        degree: usize,
-        (powers, stride): (&[f64], usize),
-        components: usize,
-    ) -> Dense {
-        let mut all = vec![0.0; components * (degree + 1)];
-        let columns = &ECONOMIES[degree - LEAST_DEGREE].columns;
-        match degree {
-            4 => write::<5>(columns, (powers, stride), all.as_chunks_mut().0),
-            5 => write::<6>(columns, (powers, stride), all.as_chunks_mut().0),
-            6 => write::<7>(columns, (powers, stride), all.as_chunks_mut().0),
-            _ => write::<{ MAX_DEGREE + 1 }>(columns, (powers, stride), all.as_chunks_mut().0),
+/// Polynomials of a degree that stand for those of many powers of the position, which are added one after another: the ends are those of
+/// the polynomials as they are given.
+#[derive(Debug)]
+pub struct Economized {
+    degree: usize,
+    /// The next power, and what its coefficients are multiplied by.
+    power: usize,
+    factor: f64,
+    shorter: f64,
+    coefficients: Vec<f64>,
+}
+
+impl Economized {
+    /// So many components of a degree from [`LEAST_DEGREE`] to [`MAX_DEGREE`], along a step that is so many times shorter than the one along
+    /// which coefficients are given.
+    pub fn new(degree: usize, components: usize, shorter: f64) -> Economized {
+        let coefficients = vec![0.0; components * (degree + 1)];
+        Economized { degree, power: 0, factor: 1.0, shorter, coefficients }
+    }
+
+    /// Adds the coefficients of the next powers of the position, from 0 on up to at most [`MAX_POWER`]: of one for all components, `stride`
+    /// numbers behind of the next, and so on.
+    pub fn add(&mut self, powers: &[f64], stride: usize) {
+        match self.degree {
+            4 => self.write::<5>(powers, stride),
+            5 => self.write::<6>(powers, stride),
+            6 => self.write::<7>(powers, stride),
+            _ => self.write::<{ MAX_DEGREE + 1 }>(powers, stride),
         }
-        Dense::new(start, Some(end), h, degree, all)
+    }
+
+    fn write<const N: usize>(&mut self, powers: &[f64], stride: usize) {
+        let Economized { degree, power, factor, shorter, coefficients } = self;
+        let count = powers.len() / stride;
+        let columns = &ECONOMIES[*degree - LEAST_DEGREE].columns[*power..][..count];
+        *power += count;
+        let all = coefficients.as_chunks_mut::<N>().0;
+        *factor = dlsys_wide::run(Write { columns, powers, stride, factor: (*factor, *shorter), all });
+    }
+
+    /// The step from one instant to another, of a length.
+    pub fn dense(self, (start, end, h): (SimTime, SimTime, f64)) -> Dense {
+        Dense::new(start, Some(end), h, self.degree, self.coefficients)
     }
 }
 
-fn write<const N: usize>(
-    columns: &[[f64; MAX_DEGREE + 1]; MAX_POWER + 1],
-    (powers, stride): (&[f64], usize),
-    all: &mut [[f64; N]],
-) {
-    dlsys_wide::run(Write { columns, powers, stride, all });
-}
-
 struct Write<'w, const N: usize> {
-    columns: &'w [[f64; MAX_DEGREE + 1]; MAX_POWER + 1],
+    columns: &'w [[f64; MAX_DEGREE + 1]],
     powers: &'w [f64],
     stride: usize,
+    /// The factor of the first power, and what it is divided by from power to power.
+    factor: (f64, f64),
     all: &'w mut [[f64; N]],
 }
 
 impl<const N: usize> Kernel for Write<'_, N> {
-    type Output = ();
+    /// The factor of the power after these.
+    type Output = f64;
 
     #[inline(always)]
-    fn run(self) {
-        let Write { columns, powers, stride, all } = self;
-        for (power, column) in columns.iter().enumerate().take(powers.len() / stride) {
+    fn run(self) -> f64 {
+        let Write { columns, powers, stride, factor: (mut factor, shorter), all } = self;
+        for (power, column) in columns.iter().enumerate() {
             let powers = &powers[power * stride..][..all.len()];
             // Copies, of which the compiler knows that nothing else is written when they are.
             let column: [f64; N] = std::array::from_fn(|i| column[i]);
             for (component, of) in all.iter_mut().enumerate() {
-                let (mut c, power) = (*of, powers[component]);
+                let (mut c, power) = (*of, factor * powers[component]);
                 for i in 0..N {
                     c[i] += power * column[i];
                 }
                 *of = c;
             }
+            factor /= shorter;
         }
+        factor
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn ends() -> (SimTime, SimTime, f64) {
+        (SimTime::ZERO, SimTime::new(1.0), 1.0)
+    }
 
     #[test]
     fn an_exponential_is_as_near_as_the_error_says_and_exact_at_its_ends() {
@@ -163,10 +188,17 @@ mod tests {
                     Some(*c)
                 })
                 .collect();
-            let powers: Vec<f64> = std::iter::once(1.0).chain(powers).flat_map(|c| [c, 2.0 * c]).collect();
-            let ends = (SimTime::ZERO, SimTime::new(1.0), 1.0);
-            let dense = Dense::of_powers(ends, degree, (&powers, 2), 2);
-            let sizes: Vec<f64> = powers.iter().step_by(2).map(|c| c.abs()).collect();
+            let powers: Vec<f64> = std::iter::once(1.0).chain(powers).collect();
+            // Along twice the length, at first several powers at once.
+            let mut economized = Economized::new(degree, 2, 2.0);
+            let double: Vec<f64> = (powers.iter().zip(0..))
+                .flat_map(|(c, power)| [1.0, 2.0].map(|factor| factor * c * 2f64.powi(power)))
+                .collect();
+            let (some, others) = double.split_at(6);
+            economized.add(some, 2);
+            others.chunks(2).for_each(|power| economized.add(power, 2));
+            let dense = economized.dense(ends());
+            let sizes: Vec<f64> = powers.iter().map(|c| c.abs()).collect();
             let error = economy_error(degree, &sizes);
             assert!(error < best, "degree {degree}: {error}");
             for n in 0..=100 {
@@ -184,8 +216,9 @@ mod tests {
     fn a_polynomial_of_low_degree_stays_what_it_is() {
         let powers = [1.0, -2.0, 0.5, 3.0, 0.25];
         for degree in LEAST_DEGREE..=MAX_DEGREE {
-            let ends = (SimTime::ZERO, SimTime::new(1.0), 1.0);
-            let dense = Dense::of_powers(ends, degree, (&powers, 1), 1);
+            let mut economized = Economized::new(degree, 1, 1.0);
+            economized.add(&powers, 1);
+            let dense = economized.dense(ends());
             assert_eq!(economy_error(degree, &powers.map(f64::abs)), 0.0);
             for n in 0..=10 {
                 let s = f64::from(n) / 10.0;

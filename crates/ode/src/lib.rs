@@ -31,7 +31,7 @@ mod workspace;
 
 pub use control::{CERTAINTY, Control, StepSettings, next_grid_time};
 pub use dense::{Coefficients, Dense, MAX_DEGREE};
-pub use economy::{LEAST_DEGREE, MAX_POWER, economy_error};
+pub use economy::{Economized, LEAST_DEGREE, MAX_POWER, economy_error};
 pub use error::Error;
 pub use methods::Method;
 pub use one_step::{InteriorError, OneStep, Step, Trial};

@@ -224,7 +224,7 @@ pub fn size(setup: &Setup, world: &World, coupled: usize) -> usize {
     /// Of more slots than this, one of so many is looked at.
     const MANY: usize = 4096;
     const SOME: usize = 16;
-    let numeric = |state: &State| state.step.as_ref().map_or(0, |step| size_of_val(&**step) + 400);
+    let numeric = |state: &State| state.trajectories.step().map_or(0, |step| size_of_val(step) + 400);
     // Most are not in the caches, and some tell what all are like.
     let every = if world.states.slots() > MANY { SOME } else { 1 };
     let some = world.states.iter().step_by(every);

@@ -434,18 +434,16 @@ impl World {
             return;
         }
         self.rebase(id, now);
-        let width = self.tree.parameters(id).len();
+        let values = self.tree.parameters(id);
+        let mut trajectories = vec![Trajectory::Rest; values.len()];
+        for (_, parameter) in kind.read_inputs() {
+            trajectories[parameter] = Trajectory::Polynomial([values[parameter + 1], 0.0, 0.0, 0.0]);
+        }
         if self.state(id).is_none() {
             self.new_state(id);
         }
         let Some(state) = self.state_mut(id) else { return };
         (state.since, state.horizon) = (now, f64::NAN);
-        state.trajectories.clear();
-        state.trajectories.resize(width, Trajectory::Rest);
-        for (_, parameter) in kind.read_inputs() {
-            let slope = self.tree.parameters(id)[parameter + 1];
-            let Some(state) = self.state_mut(id) else { return };
-            state.trajectories[parameter] = Trajectory::Polynomial([slope, 0.0, 0.0, 0.0]);
-        }
+        state.trajectories.assign(trajectories.into_iter());
     }
 }

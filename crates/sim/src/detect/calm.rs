@@ -18,6 +18,7 @@
 use crate::detect::examined::{ExaminedStep, StageRange};
 use crate::trajectory::Trajectory;
 use crate::world::state::State;
+use crate::world::trajectories::Law;
 use dlsys_expr::{Interval, Scratch, Smooth, Value};
 use dlsys_tree::ModuleId;
 
@@ -60,10 +61,8 @@ impl CalmTest {
             let values = world.tree.parameters(id);
             match world.state(id).filter(|state| !state.trajectories.is_empty()) {
                 Some(state) => {
-                    let trajectories = &state.trajectories[..values.len()];
-                    for (place, x) in values.iter().enumerate() {
-                        variables.push(range(step, stages, state, &trajectories[place], *x));
-                    }
+                    let laws = values.iter().zip(state.trajectories.iter());
+                    variables.extend(laws.map(|(x, law)| range(step, stages, state, law, *x)));
                 }
                 None => variables.extend(values.iter().map(|x| Smooth::constant(*x))),
             }
@@ -76,24 +75,22 @@ impl CalmTest {
         let birth = world.tree.birth(step.state.id);
         variables.push(Smooth::spanned(step.start.to_f64(), step.end.to_f64()));
         variables.push(Smooth::spanned(step.start.since(birth), step.end.since(birth)));
-        let switches = step.state.switches.iter().map(|&on| Smooth::constant(f64::from(u8::from(on))));
+        let switches = step.state.marks.switch_values().map(Smooth::constant);
         variables.extend(switches);
     }
 }
 
 /// The range of a parameter over a step and its stages.
 #[inline]
-fn range(step: &ExaminedStep, stages: StageRange, state: &State, trajectory: &Trajectory, x: f64) -> Smooth {
-    match (trajectory, step.own) {
-        (Trajectory::Rest, _) => Smooth::constant(x),
-        (Trajectory::Step(c), Some(dense)) if state.id == step.state.id => {
-            stages.with(*c, dense.bounds(*c as usize))
+fn range(step: &ExaminedStep, stages: StageRange, state: &State, law: Law, x: f64) -> Smooth {
+    match (law, step.own) {
+        (Law::Rest, _) => Smooth::constant(x),
+        (Law::Step(c), Some(dense)) if state.id == step.state.id => stages.with(c, dense.bounds(c as usize)),
+        (Law::Coupled(c), None) => {
+            let hull = (step.world.coupled.as_ref()).and_then(|all| all.hull(c as usize, step.start));
+            hull.map_or(Smooth::UNKNOWN, |bounds| stages.with(c, bounds))
         }
-        (Trajectory::Coupled(c), None) => {
-            let hull = (step.world.coupled.as_ref()).and_then(|all| all.hull(*c as usize, step.start));
-            hull.map_or(Smooth::UNKNOWN, |bounds| stages.with(*c, bounds))
-        }
-        (Trajectory::Polynomial(_), _) => {
+        (Law::Formula(trajectory @ Trajectory::Polynomial(_)), _) => {
             let [from, to] = [step.start, step.end].map(|at| at.since(state.since));
             let Interval { lo, hi, .. } = trajectory.within(x, from, to).value;
             Smooth::spanned(lo, hi)

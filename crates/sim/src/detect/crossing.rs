@@ -9,6 +9,7 @@ use crate::detect::level::LevelDifference;
 use crate::detect::signs::{NEAR, Reach, half_width, is_at, opposite, rate_at, reach, sign_of};
 use crate::world::path::Path;
 use crate::world::state::State;
+use crate::world::trajectories::Law;
 use dlsys_expr::{Binary, Dual, Interval, Program, Scratch, Value};
 use dlsys_model::{AffineSum, Rule, Sign, ZeroCrossing};
 use dlsys_ode::{Function, Root, first_root};
@@ -152,7 +153,7 @@ pub(super) fn location_method<'w>(crossing: &'w ZeroCrossing, state: &State) -> 
     match crossing {
         ZeroCrossing::Constant => LocationMethod::Never,
         ZeroCrossing::Formula { variable, level } => match state.trajectories.get(*variable) {
-            Some(trajectory) if !trajectory.is_formula() => LocationMethod::Search,
+            Some(law) if law.is_numeric() => LocationMethod::Search,
             _ => LocationMethod::Formula(*variable, level),
         },
         ZeroCrossing::Search { .. } => LocationMethod::Search,
@@ -394,16 +395,16 @@ impl CrossingDetector {
         }
         let level = self.level(path, level);
         let t = path.rule.time_variable();
-        let trajectory = path.state.trajectories.get(variable);
-        let start = trajectory.map_or(0.0, |_| path.world.tree.parameters(path.state.id)[variable]);
+        let law = path.state.trajectories.get(variable);
+        let start = law.map_or(0.0, |_| path.world.tree.parameters(path.state.id)[variable]);
         let clause = path.state.solve.get().map(|s| &path.rule.solves[s]);
         let (values, scratch, rates) = (&mut self.values, &mut self.scratch, &mut self.rates);
         let exact = || {
             path.start(values);
-            values.extend(path.state.switches.iter().map(|&on| f64::from(u8::from(on))));
+            values.extend(path.state.marks.switch_values());
             rate_at(clause, values, variable, level, scratch, rates)
         };
-        let met = reach(variable, t, level, trajectory, start, exact);
+        let met = reach(variable, t, level, law.and_then(Law::formula), start, exact);
         let is_known = met.is_some();
         let time = match met {
             Some(Reach::At(time)) => time,
@@ -411,7 +412,7 @@ impl CrossingDetector {
             Some(Reach::After(tau)) => path.state.since.after(tau),
             // Another event of the module may come a rounding before this one. It leaves the variable at the level or beyond it, and the
             // sign as it was.
-            None if trajectory.is_some() && is_at(level, start) => path.start,
+            None if law.is_some() && is_at(level, start) => path.start,
             None => return None,
         };
         let position = time.since(path.start) / path.h;

@@ -36,6 +36,7 @@ use crate::detect::examined::{ExaminedStep, exceeds};
 use crate::trajectory::Trajectory;
 use crate::world::course::Course;
 use crate::world::path::Path;
+use crate::world::trajectories::Law;
 use dlsys_expr::{Dual, Held, Interval, Program, Scratch};
 use dlsys_model::PulseTerms;
 use dlsys_tree::{ModuleId, SimTime};
@@ -218,7 +219,7 @@ impl PulseDetector {
         let rule = &step.conditions.rules[rule];
         let (solve, terms) = (&rule.solves[solve], &rule.solves[solve].pulses.values);
         let follows =
-            |p: &usize| state.trajectories.get(*p).is_some_and(|law| matches!(law, Trajectory::Function(_)));
+            |p: &usize| matches!(state.trajectories.get(*p), Some(Law::Formula(Trajectory::Function(_))));
         if terms.terms.outputs() == 0 || !terms.parameters.iter().any(follows) {
             return PulseFinding::Clear;
         }

@@ -7,10 +7,10 @@
 
 use super::crossing::{LocationMethod, is_clear_of, level_of_dense, location_method, reachable};
 use super::signs::{Reach, is_at, reach};
-use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::coupled_solution::CoupledSolution;
 use crate::world::state::State;
+use crate::world::trajectories::Law;
 use dlsys_expr::Program;
 use dlsys_model::{Rule, Sign, ZeroCrossing};
 use dlsys_tree::SimTime;
@@ -46,9 +46,9 @@ impl Outlook<'_> {
         reachable(rule, state).all(|(atom, crossing)| match location_method(crossing, state) {
             LocationMethod::Never => true,
             LocationMethod::Formula(variable, level) => {
-                are_formulas_free || self.is_met_later(variable, level, state.signs[atom])
+                are_formulas_free || self.is_met_later(variable, level, state.marks.signs()[atom])
             }
-            LocationMethod::Search => self.keeps_clear(crossing, state.signs[atom]),
+            LocationMethod::Search => self.keeps_clear(crossing, state.marks.signs()[atom]),
         })
     }
 
@@ -85,15 +85,15 @@ impl Outlook<'_> {
     /// The instant at which a variable with a formula meets its level.
     fn meeting(&self, variable: usize, level: &Program) -> Meeting {
         let Some(&[level]) = level.constants() else { return Meeting::Unknown };
-        let trajectory = self.state.trajectories.get(variable);
-        let start = trajectory.map_or(0.0, |_| self.world.tree.parameters(self.state.id)[variable]);
+        let law = self.state.trajectories.get(variable);
+        let start = law.map_or(0.0, |_| self.world.tree.parameters(self.state.id)[variable]);
         // Near an equilibrium the rate has to be computed from the equation as written: that is for the search.
         let mut is_known = true;
         let exact = || {
             is_known = false;
             f64::NAN
         };
-        match reach(variable, self.rule.time_variable(), level, trajectory, start, exact) {
+        match reach(variable, self.rule.time_variable(), level, law.and_then(Law::formula), start, exact) {
             Some(Reach::At(time)) => Meeting::At(time),
             Some(Reach::Age(age)) => Meeting::At(self.world.tree.birth(self.state.id).after(age)),
             Some(Reach::After(tau)) => Meeting::At(self.state.since.after(tau)),
@@ -107,8 +107,8 @@ impl Outlook<'_> {
     fn keeps_clear(&self, crossing: &ZeroCrossing, sign: Sign) -> bool {
         let level = |level: &Program| level.constants().map(|all| all[0]);
         let Some((variable, level, side)) = level_of_dense(crossing, sign, level) else { return false };
-        let bounds = self.state.trajectories.get(variable).and_then(|trajectory| match trajectory {
-            Trajectory::Coupled(component) => self.solution.hull(*component as usize, self.from),
+        let bounds = self.state.trajectories.get(variable).and_then(|law| match law {
+            Law::Coupled(component) => self.solution.hull(component as usize, self.from),
             _ => None,
         });
         bounds.is_some_and(|bounds| is_clear_of(bounds, level, side, self.solution.error))

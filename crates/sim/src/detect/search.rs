@@ -104,7 +104,7 @@ impl CrossingDetector {
         if rule.atoms.is_empty() {
             return SearchResult::default();
         }
-        let mut now = state.signs.clone();
+        let mut now: Signs = state.marks.signs().into();
         for change in state.next.changes() {
             now[change.atom()] = change.after;
         }

@@ -81,7 +81,7 @@ pub fn matters(rule: &Rule, state: &State, at: &[Sign], after: &[Sign]) -> bool 
         return true;
     }
     let Some(solve) = state.solve.get() else { return false };
-    (rule.solves[solve].switches.iter().zip(&state.switches))
+    (rule.solves[solve].switches.iter().zip(&state.marks.switches()))
         .any(|(switch, &on)| holds(&switch.condition, after) != on)
 }
 

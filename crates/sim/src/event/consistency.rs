@@ -9,6 +9,7 @@ use std::collections::HashSet;
 use super::EventStage;
 use crate::error::Error;
 use crate::flow::algebraic::{Solved, is_algebraic};
+use crate::world::state::Switches;
 use dlsys_model::Truth;
 use dlsys_tree::ModuleId;
 
@@ -57,11 +58,11 @@ impl EventStage<'_, '_> {
             if clause.algebraic.is_empty() || state.open.as_ref().is_none_or(|open| open.flow.is_some()) {
                 continue;
             }
-            let signs = &state.signs;
+            let signs = state.marks.signs();
             let holds = |s: &dlsys_model::Switch| s.condition.judge(|i| signs[i]) != Truth::No;
-            let sides: crate::world::state::Switches = clause.switches.iter().map(holds).collect();
-            changed |= sides != state.switches;
-            state.switches = sides;
+            let sides: Switches = clause.switches.iter().map(holds).collect();
+            changed |= sides != state.marks.switches();
+            state.marks.set_switches(&sides);
         }
         changed
     }
@@ -113,11 +114,13 @@ impl EventStage<'_, '_> {
             }
             if state.solve.get().is_none() && !chosen {
                 // The equations that it is going to have, as far as can be told.
-                let signs = &state.signs;
+                let signs = state.marks.signs();
                 let may = |guard: &dlsys_model::Condition| guard.judge(|i| signs[i]) != Truth::No;
-                state.solve = rule.solves.iter().position(|s| may(&s.guard)).into();
-                let switches = state.solve.get().map_or(&[][..], |s| &rule.solves[s].switches);
-                state.switches = switches.iter().map(|s| may(&s.condition)).collect();
+                let solve = rule.solves.iter().position(|s| may(&s.guard));
+                let switches = solve.map_or(&[][..], |s| &rule.solves[s].switches);
+                let sides: Switches = switches.iter().map(|s| may(&s.condition)).collect();
+                state.marks.set_switches(&sides);
+                state.solve = solve.into();
             }
             wanted.push(id);
         }
@@ -203,8 +206,10 @@ impl EventStage<'_, '_> {
         let now = self.instant.at;
         let state = self.world.state_mut(id).expect("seen above");
         state.pass_changes(now);
-        let same = is_open && state.signs == signs && state.open.as_ref().is_some_and(|o| o.at == signs);
-        state.signs = signs;
+        let same = is_open
+            && *state.marks.signs() == signs[..]
+            && state.open.as_ref().is_some_and(|o| o.at == signs);
+        state.marks.set_signs(&signs);
         state.place(clear);
         if !is_open {
             self.events.opened.push(id);

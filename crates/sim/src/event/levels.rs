@@ -49,7 +49,7 @@ pub fn put_levels(
 
 /// Most by which a value that a module reads may be corrected, as a part of its size or of 1.
 fn error_of(setup: &Setup, world: &World, state: &State) -> f64 {
-    let own = state.step.as_ref().map_or(0.0, |step| step.dense.error);
+    let own = state.trajectories.step().map_or(0.0, |step| step.dense.error);
     let common = world.coupled.as_ref().map_or(0.0, |solution| solution.error);
     (ERRORS * own.max(common)).max(TOLERANCES * setup.settings.tolerance)
 }

@@ -27,7 +27,7 @@ fn goes_on(state: &State, rule: &Rule, number: usize, context: &Context) -> bool
     state.context.len() == context.len()
         && rule.aggregates.is_empty()
         && !rule.is_algebraic()
-        && state.signs.iter().all(is_clear)
+        && state.marks.signs().iter().all(is_clear)
         && reads_own(&rule.watched)
         && reads_own(clause.stepping.formulas_read())
 }
@@ -182,8 +182,8 @@ impl EventStage<'_, '_> {
             self.flows.coupled.loosened.extend_from_slice(&state.context);
         }
         state.context = context.clone();
-        state.signs = signs;
-        state.switches.clear();
+        state.marks.set_switches(&[]);
+        state.marks.set_signs(&signs);
         state.next = if state.rule.get() == Some(rule) { state.next.again() } else { Default::default() };
         (state.since, state.horizon) = (self.instant.at, f64::NAN);
         if compiled.is_plain() {
@@ -221,7 +221,7 @@ impl EventStage<'_, '_> {
         {
             for (atom, &unreachable) in compiled.solves[solve].unreachable.iter().enumerate() {
                 if unreachable {
-                    signs[atom] = state.signs[atom];
+                    signs[atom] = state.marks.signs()[atom];
                 }
             }
         }
@@ -233,7 +233,7 @@ impl EventStage<'_, '_> {
         let now = self.instant.at;
         let state = self.world.state_mut(id)?;
         state.pass_changes(now);
-        (state.rule.get() == Some(rule)).then(|| state.signs.clone())
+        (state.rule.get() == Some(rule)).then(|| state.marks.signs().into())
     }
 
     /// The modules whose rules have contexts, in string order.

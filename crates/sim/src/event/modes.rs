@@ -98,7 +98,7 @@ impl EventStage<'_, '_> {
                 return Err(self.no_equations(&missing));
             }
             for (id, signs) in pass.settled {
-                self.world.state_mut(id).expect("settled").signs = signs;
+                self.world.state_mut(id).expect("settled").marks.set_signs(&signs);
             }
             return Ok(());
         }
@@ -157,7 +157,7 @@ impl EventStage<'_, '_> {
             (entry.flips, entry.chosen) = (0, 0);
             let guess = entry.guess.clone();
             state.solve = next_clause(rule, &guess, &[]).into();
-            state.switches = switches(rule, state.solve.get(), &guess);
+            state.marks.set_switches(&switches(rule, state.solve.get(), &guess));
         }
     }
 
@@ -179,7 +179,7 @@ impl EventStage<'_, '_> {
         let rule = &self.setup.model.rules[state.rule.get().expect("open modules have a rule")];
         match rule.solves.iter().position(|solve| solve.guard.judge(|i| signs[i]) == Truth::Yes) {
             None => true,
-            first => first == state.solve.get() && switches(rule, first, signs) == state.switches,
+            first => first == state.solve.get() && switches(rule, first, signs) == state.marks.switches(),
         }
     }
 
@@ -204,7 +204,7 @@ impl EventStage<'_, '_> {
             match untried.or_else(|| next_clause(rule, &any, &entry.tried)) {
                 Some(next) => {
                     state.solve = Some(next).into();
-                    state.switches = switches(rule, state.solve.get(), &signs);
+                    state.marks.set_switches(&switches(rule, state.solve.get(), &signs));
                     entry.chosen = choices;
                     self.events.choices = choices;
                     self.flows.known_rates.forget(id);
@@ -218,13 +218,14 @@ impl EventStage<'_, '_> {
             return;
         }
         let wanted = switches(rule, state.solve.get(), &signs);
-        if wanted != state.switches {
+        let other = state.marks.switches();
+        if wanted != other {
             entry.flips += 1;
             entry.chosen = choices;
             self.events.choices = choices;
             let undecided = entry.flips > FLIPS;
             let at_rest = entry.flips == FLIPS + 1;
-            let other = std::mem::replace(&mut state.switches, wanted);
+            state.marks.set_switches(&wanted);
             self.flows.known_rates.forget(id);
             let smooth = undecided && self.is_smooth_across(id, &other);
             if smooth || at_rest {
@@ -234,7 +235,7 @@ impl EventStage<'_, '_> {
                 let both = at.iter().zip(&signs);
                 let rest: Signs =
                     both.map(|(at, after)| if *at == Sign::Zero { Sign::Zero } else { *after }).collect();
-                state.switches = switches(rule, state.solve.get(), &rest);
+                state.marks.set_switches(&switches(rule, state.solve.get(), &rest));
                 if !smooth {
                     pass.changed = Some((id, signs));
                 }
@@ -271,7 +272,7 @@ impl EventStage<'_, '_> {
     fn choice_of(&self, opened: &[ModuleId]) -> u64 {
         let mut hasher = DefaultHasher::new();
         for state in opened.iter().filter_map(|id| self.world.state(*id)) {
-            (state.solve.get(), &state.switches).hash(&mut hasher);
+            (state.solve.get(), state.marks.switches()).hash(&mut hasher);
         }
         hasher.finish()
     }
@@ -281,9 +282,9 @@ impl EventStage<'_, '_> {
         let is_new = || self.instant.at.since(self.world.tree.birth(id)) <= 0.0;
         let Some(state) = self.world.state(id) else { return !is_new() };
         let is_other = |open: &Open| {
-            open.flow
-                .as_ref()
-                .is_none_or(|(solve, switches)| *solve != state.solve.get() || *switches != state.switches)
+            open.flow.as_ref().is_none_or(|(solve, switches)| {
+                *solve != state.solve.get() || *switches != state.marks.switches()
+            })
         };
         let begins_anew = match &state.open {
             Some(open) => is_other(open),
@@ -303,7 +304,9 @@ impl EventStage<'_, '_> {
         let swap = |simulation: &mut Self, switches: Switches| {
             simulation.flows.known_rates.forget(id);
             let state = simulation.world.state_mut(id).expect("open modules have a state");
-            std::mem::replace(&mut state.switches, switches)
+            let before = state.marks.switches();
+            state.marks.set_switches(&switches);
+            before
         };
         let own = swap(self, other.clone());
         self.flow().rates_now(id, &mut there);

@@ -146,9 +146,9 @@ impl EventStage<'_, '_> {
         let mut resting = std::mem::take(&mut self.events.resting);
         for id in resting.drain(..) {
             let state = self.world.state(id);
-            if state
-                .is_some_and(|s| s.rule.get().is_some() && s.open.is_none() && s.signs.contains(&Sign::Zero))
-            {
+            if state.is_some_and(|s| {
+                s.rule.get().is_some() && s.open.is_none() && s.marks.signs().contains(&Sign::Zero)
+            }) {
                 self.touch(id, &[]);
             }
         }
@@ -168,7 +168,7 @@ impl EventStage<'_, '_> {
                     .rule
                     .get()
                     .map_or(&[][..], |rule| self.setup.model.rules[rule].zero_crossings(s.solve.get()));
-                let mut atoms = s.signs.iter().zip(watch);
+                let mut atoms = s.marks.signs().iter().zip(watch);
                 atoms.any(|(sign, watch)| *sign == Sign::Zero && !matches!(watch, ZeroCrossing::Constant))
             };
             if state.is_some_and(|s| !s.context.is_empty() && rests(s)) {
@@ -186,7 +186,8 @@ impl EventStage<'_, '_> {
             return Err(self.flow().in_doubt(id, atom));
         }
         if state.next.kind == NextKind::Fault {
-            let ends: Vec<Option<f64>> = state.trajectories.iter().map(Trajectory::end).collect();
+            let laws = state.trajectories.iter();
+            let ends: Vec<Option<f64>> = laws.map(|law| law.formula().and_then(Trajectory::end)).collect();
             let first = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
             let parameter = ends.iter().enumerate().filter_map(|(i, e)| Some((i, (*e)?))).min_by(first);
             let since = state.since;
@@ -244,8 +245,9 @@ impl EventStage<'_, '_> {
         let state = self.world.make_state(id);
         state.renew(id);
         state.put_under(index, solve);
-        state.signs = signs;
-        (state.since, state.trajectories) = (now, trajectories);
+        state.marks.set_signs(&signs);
+        state.since = now;
+        state.trajectories.assign(trajectories.into_iter());
         let kind = if change.is_none() { NextKind::Nothing } else { NextKind::Event };
         state.next.touch(kind, change.into_iter().collect());
         state.restart(self.instant.number);
@@ -278,7 +280,10 @@ impl EventStage<'_, '_> {
         }
         let touched = state.next.touched();
         let at = |i: usize| {
-            touched.iter().find(|change| change.atom() == i).map_or(state.signs[i], |change| change.at)
+            touched
+                .iter()
+                .find(|change| change.atom() == i)
+                .map_or(state.marks.signs()[i], |change| change.at)
         };
         let produces = &self.setup.model.rules[rule].produces;
         let produce = produces.iter().position(|p| p.guard.judge(at) == Truth::Yes)?;

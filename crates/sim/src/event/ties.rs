@@ -6,7 +6,7 @@ use crate::detect::doubt::FAR;
 use crate::detect::signs::{opposite, produces};
 use crate::flow::algebraic::is_algebraic;
 use crate::world::path::Path;
-use crate::world::state::{Change, NextKind};
+use crate::world::state::{Change, NextKind, Signs};
 use dlsys_model::Sign;
 use dlsys_tree::ModuleId;
 use smallvec::SmallVec;
@@ -69,7 +69,7 @@ impl EventStage<'_, '_> {
             return None;
         }
         // The next event, or the end of the searched stretch, is mostly far away.
-        let known = match (&state.next.kind, &self.world.coupled, &state.step) {
+        let known = match (&state.next.kind, &self.world.coupled, state.trajectories.step()) {
             (NextKind::Event, ..) => state.next.touched()[0].time,
             (_, Some(solution), _) if state.coupled => solution.end,
             (_, _, Some(step)) => step.dense.end,
@@ -86,7 +86,7 @@ impl EventStage<'_, '_> {
         if known.since(self.instant.at) > FAR * factor * error * reach.max(self.instant.at.resolution()) {
             return None;
         }
-        let mut signs = state.signs.clone();
+        let mut signs: Signs = state.marks.signs().into();
         for change in state.next.changes().iter().filter(|change| change.time.since(self.instant.at) <= 0.0) {
             signs[change.atom()] = change.after;
         }

@@ -90,7 +90,7 @@ fn instant_system(
             table.sources.push(VariableSource::Aggregate(table.aggregates.len() as u32 - 1));
         }
         table.sources.resize(first_source + compiled.variables - 2, VariableSource::Fixed(0.0));
-        let switches = state.switches.iter().map(|&on| f64::from(u8::from(on)));
+        let switches = state.marks.switch_values();
         let birth = world.tree.birth(id);
         let sources = compiled.variables - 2;
         let shape = (first_source, sources);
@@ -173,7 +173,7 @@ impl FlowStage<'_, '_> {
         let model = self.setup.model;
         let Some(state) = self.world.state(id) else { return };
         let (Some(rule), Some(solve)) = (state.rule.get(), state.solve.get()) else { return };
-        let (compiled, switches) = (&model.rules[rule], state.switches.clone());
+        let (compiled, switches) = (&model.rules[rule], state.marks.switches());
         let algebraic = &compiled.solves[solve].algebraic;
         let around: Context = state.context.clone();
         if algebraic.is_empty() || depth == 0 {

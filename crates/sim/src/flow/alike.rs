@@ -20,8 +20,8 @@ use crate::flow::FlowStage;
 use crate::flow::independent::{Experience, Made};
 use crate::flow::orbits::{Onward, Orbits, Traveller};
 use crate::schedule::Owner;
-use crate::trajectory::Trajectory;
 use crate::world::state::{Next, NextKind, State, Step};
+use crate::world::trajectories::Law;
 use dlsys_model::{Model, Rule, Solve};
 use dlsys_tree::{ModuleId, SimTime};
 
@@ -238,7 +238,7 @@ impl FlowStage<'_, '_> {
     pub(super) fn keep_step(&mut self, id: ModuleId, at: SimTime) {
         let Some(state) = self.world.state(id) else { return };
         let is_plain = matches!(state.next.kind, NextKind::Event | NextKind::Window);
-        let Some(step) = state.step.as_ref().filter(|_| is_plain) else { return };
+        let Some(step) = state.trajectories.step().filter(|_| is_plain) else { return };
         let KnownSteps { orbits, orbit, now, .. } = &mut self.flows.known_steps;
         let is_kept = orbit.is_some_and(|Rests { hash, words, error }| {
             orbits.keep((hash, &now.words[..words]), step, (&state.next, at), error)
@@ -273,16 +273,16 @@ impl FlowStage<'_, '_> {
         let (mut moving, mut others) = (None, is_timed || *age || state.next.near() != 0);
         for (parameter, value) in values.iter().enumerate() {
             match state.trajectories.get(parameter) {
-                None | Some(Trajectory::Rest) if parameters & 1 << parameter != 0 => {
+                None | Some(Law::Rest) if parameters & 1 << parameter != 0 => {
                     words.push(value.to_bits())
                 }
-                None | Some(Trajectory::Rest) => {}
-                Some(Trajectory::Step(_)) if moving.is_none() => moving = Some(*value),
+                None | Some(Law::Rest) => {}
+                Some(Law::Step(_)) if moving.is_none() => moving = Some(*value),
                 Some(_) => others = true,
             }
         }
-        words.extend(state.signs.iter().map(|sign| *sign as u64));
-        words.extend(state.switches.iter().map(|on| u64::from(*on)));
+        words.extend(state.marks.signs().iter().map(|sign| *sign as u64));
+        words.extend(state.marks.switches().iter().map(|on| u64::from(*on)));
         let x = moving.filter(|_| !others);
         let (words, error) = (&words[..], experience.control.error);
         *orbit = x.map(|_| Rests { hash: hash_of(words), words: words.len(), error });
@@ -298,8 +298,8 @@ impl FlowStage<'_, '_> {
         let Reading { parameters, time, .. } = readings[(clause >> 32) as usize][clause as u32 as usize];
         for (parameter, value) in tree.parameters(id).iter().enumerate() {
             match state.trajectories.get(parameter) {
-                None | Some(Trajectory::Rest) => {}
-                Some(Trajectory::Step(_)) => words.push(value.to_bits()),
+                None | Some(Law::Rest) => {}
+                Some(Law::Step(_)) => words.push(value.to_bits()),
                 Some(_) if parameters & 1 << parameter != 0 => words.push(value.to_bits()),
                 Some(_) => {}
             }

@@ -157,8 +157,8 @@ pub fn integrated(c: &[f64], age: f64) -> [f64; 4] {
 /// A time in which the formulas of a module change noticeably.
 pub fn time_scale(state: &State, tree: &Tree) -> f64 {
     let values = tree.parameters(state.id);
-    let times = state.trajectories.iter().zip(values).filter_map(|(trajectory, x)| {
-        let rate = trajectory.rate(0.0).abs();
+    let times = state.trajectories.iter().zip(values).filter_map(|(law, x)| {
+        let rate = law.formula()?.rate(0.0).abs();
         (rate > 0.0 && *x != 0.0).then(|| (x.abs() / rate).clamp(1e-9, 1e9))
     });
     times.reduce(f64::min).unwrap_or(FIRST_WINDOW)

@@ -8,6 +8,7 @@ use crate::flow::FlowStage;
 use crate::flow::integrator::{StepError, StepRequest};
 use crate::trajectory::Trajectory;
 use crate::world::state::{Control, Hurdle, State, Step};
+use crate::world::trajectories::Law;
 use crate::world::{World, describe};
 use dlsys_expr::{Program, Scratch};
 use dlsys_model::{Rule, Solve};
@@ -125,14 +126,14 @@ impl<'a> Independent<'a> {
             context.iter().for_each(|module| world.values(*module, from, &mut variables));
         }
         // What programs leave behind the variables stays: there is room for it then.
-        let count = rule.variables + state.switches.len();
+        let count = rule.variables + state.marks.switch_values().count();
         if variables.len() < count {
             variables.resize(count, 0.0);
         }
         // Those that move, and the times, are filled in for each evaluation.
         variables[..own.len()].copy_from_slice(own);
-        for (place, &on) in variables[rule.variables..].iter_mut().zip(&state.switches) {
-            *place = f64::from(u8::from(on));
+        for (place, on) in variables[rule.variables..].iter_mut().zip(state.marks.switch_values()) {
+            *place = on;
         }
         let (t, age) = (from.to_f64(), from.since(world.tree.birth(state.id)));
         let solve = &rule.solves[state.solve.get().expect("numeric trajectories have equations")];
@@ -140,14 +141,14 @@ impl<'a> Independent<'a> {
         let mut numeric: SmallVec<[usize; 4]> = smallvec::smallvec![0; program.outputs()];
         let mut formulas = SmallVec::new();
         y.resize(program.outputs(), 0.0);
-        for (i, trajectory) in state.trajectories.iter().enumerate() {
-            match trajectory {
-                Trajectory::Rest => {}
-                Trajectory::Step(c) | Trajectory::Coupled(c) => {
-                    numeric[*c as usize] = i;
-                    y[*c as usize] = own[i];
+        for (i, law) in state.trajectories.iter().enumerate() {
+            match law {
+                Law::Rest => {}
+                Law::Step(c) | Law::Coupled(c) => {
+                    numeric[c as usize] = i;
+                    y[c as usize] = own[i];
                 }
-                formula => formulas.push((i, formula, own[i])),
+                Law::Formula(formula) => formulas.push((i, formula, own[i])),
             }
         }
         let (offset, time) = (from.since(state.since), rule.time_variable());
@@ -288,7 +289,7 @@ impl FlowStage<'_, '_> {
         let state = self.world.state(id).expect("a module with a rule");
         let solve = state.solve.get().expect("has equations");
         let hint = self.flows.hints[self.world.tree.kind(id).index()][solve];
-        let last = state.step.as_ref();
+        let last = state.trajectories.step();
         let (mut control, number, hurdle) = match last {
             Some(s) if s.solve == solve => (s.control, s.number + 1, s.hurdle),
             Some(s) if s.live => (s.control, 0, hint.hurdle),
@@ -318,7 +319,7 @@ impl FlowStage<'_, '_> {
         let dense = self.make_own_step(id, from, &mut control, accuracy).map_err(|error| {
             let own = |component: usize| {
                 let state = self.world.state(id)?;
-                let is_it = |m: &Trajectory| matches!(m, Trajectory::Step(c) if *c as usize == component);
+                let is_it = |law| matches!(law, Law::Step(c) if c as usize == component);
                 Some((id, state.trajectories.iter().position(is_it)?))
             };
             self.step_error(error, from, own)
@@ -342,7 +343,7 @@ impl FlowStage<'_, '_> {
         let state = self.world.state_mut(id).expect("a module with a rule");
         let solve = state.solve.get().expect("has equations");
         let Made { dense, control, number, hurdle } = made;
-        let crawling = match &mut state.step {
+        let crawling = match state.trajectories.step_mut() {
             Some(step) => {
                 if !step.live {
                     (step.mark, step.since_mark) = (from, 0);
@@ -354,7 +355,7 @@ impl FlowStage<'_, '_> {
                 (step.number, step.hurdle) = (number, hurdle);
                 crawls(&mut step.mark, &mut step.since_mark, from)
             }
-            step => {
+            None => {
                 let (begun, mark, since_mark, first) = (from, from, 0, control.size);
                 let step_made = Step {
                     dense,
@@ -368,7 +369,7 @@ impl FlowStage<'_, '_> {
                     mark,
                     since_mark,
                 };
-                *step = Some(Box::new(step_made));
+                state.trajectories.begin_steps(step_made);
                 false
             }
         };
@@ -397,7 +398,7 @@ impl FlowStage<'_, '_> {
         let mut system = Independent::new(self.world, state, rule, from, variables, scratch, &mut y);
         let integrator = &mut self.flows.independent;
         // A step that begins at the end of the module's last one need not evaluate its rates again.
-        let last = state.step.as_ref().filter(|s| s.live);
+        let last = state.trajectories.step().filter(|s| s.live);
         if last.is_some_and(|s| self.flows.independent_last == Some((id, s.dense.end)))
             && y.len() == integrator.size()
         {
@@ -453,7 +454,7 @@ impl FlowStage<'_, '_> {
     pub fn learn(&mut self, id: ModuleId) {
         let (now, kind) = (self.instant.at, self.world.tree.kind(id).index());
         let Some(state) = self.world.state_mut(id) else { return };
-        let (Some(solve), Some(step)) = (state.solve.get(), &mut state.step) else { return };
+        let (Some(solve), Some(step)) = (state.solve.get(), state.trajectories.step_mut()) else { return };
         if step.live {
             let control = &mut step.control;
             control.foresee(control.last_error, now.since(step.dense.start), now.resolution());

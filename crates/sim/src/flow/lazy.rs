@@ -125,10 +125,10 @@ pub fn materialise(
     let state = world.make_state(id);
     state.renew(id);
     state.put_under(class.rule, class.solve);
-    state.signs = class.signs;
+    state.marks.set_signs(&class.signs);
     state.since = life.birth;
     state.restart(instant.number);
-    state.trajectories = life.trajectories.clone();
+    state.trajectories.assign(life.trajectories.iter().cloned());
     match class.end {
         Some(End::AtBirth { .. }) => state.place(false),
         Some(End::Crossing { atom, after, .. }) => {

@@ -31,6 +31,7 @@ use crate::trajectory::Trajectory;
 use crate::world::neighbours::Neighbours;
 use crate::world::path::Path;
 use crate::world::state::{Change, Next, NextKind};
+use crate::world::trajectories::{Law, Trajectories};
 use crate::world::{Instant, World};
 use alike::{Followed, KnownSteps};
 use coupled::Coupled;
@@ -95,7 +96,8 @@ impl Flows {
     /// The estimated error now of integrated values that a module reads, relative; 0 where nothing is integrated.
     pub fn error_of(&self, world: &World, id: ModuleId) -> f64 {
         let Some(state) = world.state(id) else { return 0.0 };
-        let own = state.step.as_ref().filter(|_| state.is_numeric()).map_or(0.0, |step| step.dense.error);
+        let step = state.trajectories.step().filter(|_| state.is_numeric());
+        let own = step.map_or(0.0, |step| step.dense.error);
         let common = if world.coupled.is_some() { self.coupled.control.error } else { 0.0 };
         own.max(common)
     }
@@ -155,11 +157,8 @@ impl FlowStage<'_, '_> {
             return;
         };
         if !numeric_only && solve.is_all_numeric() {
-            let trajectories = self.begin_anew(id, false);
-            (0..rule.parameters.len()).for_each(|_| trajectories.push(Trajectory::Rest));
-            for (component, &position) in solve.numeric.iter().enumerate() {
-                trajectories[solve.of[position]] = Trajectory::Step(component as u32);
-            }
+            let numeric = solve.numeric.iter().map(|position| solve.of[*position]);
+            self.begin_anew(id, false).follow_step(rule.parameters.len(), numeric);
             return;
         }
         let mut trajectories = std::mem::take(&mut self.flows.trajectories);
@@ -174,12 +173,12 @@ impl FlowStage<'_, '_> {
         } else {
             let read = (rule, solve.stepping.formulas_read());
             self.world.variables_read(read, id, &state.context, self.instant.at, &mut self.scratch.variables);
-            self.scratch.variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
+            self.scratch.variables.extend(state.marks.switch_values());
             refused = !closed_form::formulas(solve, rule.time_variable(), self.scratch, &mut trajectories)
                 || !closed_form::functions(solve, rule.time_variable(), self.scratch, &mut trajectories);
         }
         if !refused {
-            self.begin_anew(id, numeric_only).extend(trajectories.drain(..));
+            self.begin_anew(id, numeric_only).assign(trajectories.drain(..));
         }
         self.flows.trajectories = trajectories;
         if refused {
@@ -187,17 +186,16 @@ impl FlowStage<'_, '_> {
         }
     }
 
-    /// Ends the trajectories of a module; those from the present on are to be put into the list, which is empty.
-    fn begin_anew(&mut self, id: ModuleId, numeric_only: bool) -> &mut SmallVec<[Trajectory; 2]> {
+    /// Ends the trajectories of a module; those from the present on are to be put in their place.
+    fn begin_anew(&mut self, id: ModuleId, numeric_only: bool) -> &mut Trajectories {
         let now = self.instant.at;
         let state = self.world.state_mut(id).expect("a module with a rule");
         state.since = now;
         state.numeric_only = numeric_only;
         state.horizon = f64::NAN;
-        if let Some(step) = &mut state.step {
+        if let Some(step) = state.trajectories.step_mut() {
             step.live = false;
         }
-        state.trajectories.clear();
         &mut state.trajectories
     }
 
@@ -240,12 +238,13 @@ impl FlowStage<'_, '_> {
         let state = self.world.state(id).expect("seen above");
         let path = Path::new(self.world, state, rule, from, h);
         let found = self.detector.crossings.search(&path, limit);
-        let end = (state.trajectories.iter()).filter_map(Trajectory::end).reduce(f64::min);
+        let formulas = state.trajectories.iter().filter_map(Law::formula);
+        let end = formulas.filter_map(Trajectory::end).reduce(f64::min);
         let end = end.map(|tau| state.since.after(tau));
         let (kind, at) = match found.event {
             Some(_) if found.in_doubt => (NextKind::Doubt, found.touched[0].time),
             Some(_) => (NextKind::Event, found.touched[0].time),
-            None if numeric => (NextKind::Window, state.step.as_ref().map_or(from, |s| s.dense.end)),
+            None if numeric => (NextKind::Window, state.trajectories.step().map_or(from, |s| s.dense.end)),
             None if limit.is_finite() => (NextKind::Window, from.after(h)),
             None => (NextKind::Nothing, from),
         };
@@ -283,11 +282,11 @@ impl FlowStage<'_, '_> {
             let (a, b) = (sides[2 * atom], sides[2 * atom + 1]);
             (a - b).abs() <= ARRIVED * self.setup.settings.tolerance * a.abs().max(b.abs()).max(1.0)
         };
-        let signed = |atom: &usize| matches!(state.signs[*atom], Sign::Plus | Sign::Minus);
+        let signed = |atom: &usize| matches!(state.marks.signs()[*atom], Sign::Plus | Sign::Minus);
         let touched: SmallVec<[Change; 1]> = (0..rule.atoms.len())
             .filter(signed)
             .filter(near)
-            .map(|atom| Change::new(atom, at, [Sign::Zero, state.signs[atom]]))
+            .map(|atom| Change::new(atom, at, [Sign::Zero, state.marks.signs()[atom]]))
             .collect();
         if touched.is_empty() {
             return None;
@@ -314,10 +313,10 @@ impl FlowStage<'_, '_> {
         let state = self.world.state(id).expect("scheduled");
         let first = self.world.tree.places(id).start;
         let ends: SmallVec<[(usize, f64); 4]> = (state.trajectories.iter().enumerate())
-            .filter_map(|(parameter, trajectory)| match trajectory {
-                Trajectory::Step(c) => {
-                    let dense: &Dense = &state.step.as_ref()?.dense;
-                    Some((first + parameter, dense.value(*c as usize, dense.position(at))))
+            .filter_map(|(parameter, law)| match law {
+                Law::Step(c) => {
+                    let dense: &Dense = &state.trajectories.step()?.dense;
+                    Some((first + parameter, dense.value(c as usize, dense.position(at))))
                 }
                 _ => None,
             })
@@ -336,7 +335,7 @@ impl FlowStage<'_, '_> {
             if state.coupled {
                 self.flows.coupled.reintegrated = true;
                 self.flows.coupled.loosened.extend_from_slice(&state.context);
-                coupled.iter_mut().for_each(|solution| solution.release(&state.trajectories));
+                coupled.iter_mut().for_each(|solution| solution.release(state.trajectories.coupled()));
             }
             self.schedule.cancel(Owner::Module(id.slot() as u32));
         }

@@ -96,20 +96,20 @@ impl FlowStage<'_, '_> {
     /// The error of a rate of a module that is no number now, or on the other side of a condition inside the equations, as that of an array
     /// beyond its end: it leads nowhere, and looks like equations that push against each other, or like events without end.
     pub fn undefined_rate(&mut self, id: ModuleId) -> Option<Error> {
-        let sides = self.world.state(id)?.switches.clone();
+        let sides = self.world.state(id)?.marks.switches();
         let mut rates = Vec::new();
         let others = std::iter::once(None).chain((0..sides.len()).map(Some));
         let parameter = others.into_iter().find_map(|other| {
-            let state = self.world.state_mut(id)?;
-            state.switches.clone_from(&sides);
-            if let Some(side) = other.and_then(|other| state.switches.get_mut(other)) {
+            let mut turned = sides.clone();
+            if let Some(side) = other.and_then(|other| turned.get_mut(other)) {
                 *side = !*side;
             }
+            self.world.state_mut(id)?.marks.set_switches(&turned);
             self.flows.known_rates.forget(id);
             self.rates_now(id, &mut rates);
             rates.iter().position(|rate| !rate.is_finite())
         });
-        self.world.state_mut(id)?.switches = sides;
+        self.world.state_mut(id)?.marks.set_switches(&sides);
         self.flows.known_rates.forget(id);
         Some(self.world.rate_not_finite(self.setup.model, id, parameter?, self.instant.at))
     }
@@ -150,7 +150,7 @@ impl FlowStage<'_, '_> {
             gather(&model.rules[rule], &around, times, &mut variables, &mut Vec::new(), |_| true, child);
         }
         let state = self.world.state(id).expect("seen above");
-        variables.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
+        variables.extend(state.marks.switch_values());
         let mut rates: SmallVec<[f64; 4]> = smallvec::smallvec![0.0; solve.rates.outputs()];
         solve.rates.eval(&variables, &mut self.scratch.registers, &mut rates);
         self.log.stats.rhs_evaluations += 1;

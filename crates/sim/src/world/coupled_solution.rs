@@ -4,7 +4,6 @@ use dlsys_expr::{Dual, Interval};
 use dlsys_ode::{Coefficients, Dense};
 use dlsys_tree::{SimTime, room};
 
-use crate::trajectory::Trajectory;
 use crate::world::prefetch::fetch;
 
 /// The trajectory of all components from the last common step to its end.
@@ -145,11 +144,12 @@ impl CoupledSolution {
         Some(DenseComponent::new(dense, component, start, h))
     }
 
-    /// Adds a component that is not integrated yet.
-    pub fn add(&mut self, components: usize) -> usize {
+    /// Adds some components that are not integrated yet, to so many at least; gives the number of the first.
+    pub fn add(&mut self, components: usize, more: usize) -> usize {
         self.track_all(components);
-        room::push(&mut self.tracks, Track::NOWHERE);
-        self.tracks.len() - 1
+        let first = self.tracks.len();
+        room::lengthen(&mut self.tracks, first + more, || Track::NOWHERE);
+        first
     }
 
     /// Puts stretches in place of those that some components have followed. `components` are numbered as in the stretches.
@@ -177,12 +177,10 @@ impl CoupledSolution {
         }
     }
 
-    /// Notes that nobody asks for the components of a module any more.
-    pub fn release(&mut self, trajectories: &[Trajectory]) {
-        for trajectory in trajectories {
-            if let Trajectory::Coupled(component) = trajectory
-                && let Some(track) = self.tracks.get_mut(*component as usize)
-            {
+    /// Notes that nobody asks for some components any more.
+    pub fn release(&mut self, components: impl IntoIterator<Item = u32>) {
+        for component in components {
+            if let Some(track) = self.tracks.get_mut(component as usize) {
                 let before = std::mem::replace(track, Track::NOWHERE);
                 self.leave(before);
             }
@@ -318,7 +316,7 @@ mod tests {
         assert_eq!((solution.free.len(), solution.stretches.len()), (0, 4));
         assert_eq!(values(&solution), [100.0, 200.0, 3000.0].map(Some));
         // A module that dies follows nothing.
-        solution.release(&[Trajectory::Rest, Trajectory::Coupled(1)]);
+        solution.release([1]);
         assert_eq!(values(&solution), [Some(100.0), None, Some(3000.0)]);
         assert_eq!(solution.free.len(), 1);
         // Several stretches end to end take places of their own.

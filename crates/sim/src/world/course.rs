@@ -5,6 +5,7 @@ use super::path::Path;
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::{CoupledSolution, value_of};
 use crate::world::state::State;
+use crate::world::trajectories::Law;
 use dlsys_expr::Dual;
 use dlsys_model::Rule;
 use dlsys_ode::Dense;
@@ -55,13 +56,15 @@ impl<'c> Course<'c> {
             let first = resting.len();
             resting.extend_from_slice(world.tree.parameters(id));
             let Some(other) = world.state(id) else { continue };
-            let own = step.filter(|_| id == state.id).or(other.step.as_ref().map(|step| &step.dense));
-            for (parameter, trajectory) in other.trajectories.iter().enumerate() {
-                let motion = match trajectory {
-                    Trajectory::Rest => None,
-                    Trajectory::Step(c) => own.map(|dense| Motion::Step(dense, *c)),
-                    Trajectory::Coupled(c) => world.coupled.as_ref().map(|all| Motion::Coupled(all, *c)),
-                    formula => Some(Motion::Formula(formula, resting[first + parameter], other.since)),
+            let own = step.filter(|_| id == state.id).or(other.trajectories.step().map(|step| &step.dense));
+            for (parameter, law) in other.trajectories.iter().enumerate() {
+                let motion = match law {
+                    Law::Rest => None,
+                    Law::Step(c) => own.map(|dense| Motion::Step(dense, c)),
+                    Law::Coupled(c) => world.coupled.as_ref().map(|all| Motion::Coupled(all, c)),
+                    Law::Formula(formula) => {
+                        Some(Motion::Formula(formula, resting[first + parameter], other.since))
+                    }
                 };
                 moving.extend(motion.map(|motion| (first + parameter, motion)));
             }
@@ -70,7 +73,7 @@ impl<'c> Course<'c> {
         let time = rule.time_variable();
         moving.push((time, Motion::Time));
         moving.push((time + 1, Motion::Age(world.tree.birth(state.id))));
-        resting.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
+        resting.extend(state.marks.switch_values());
         let gathered = (!rule.aggregates.is_empty()).then_some((world, state, rule, step));
         Course { resting, moving, gathered }
     }

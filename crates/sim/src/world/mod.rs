@@ -1,7 +1,8 @@
 //! The world: the modules of the structure and how their parameters move.
 //!
 //! - [`World`]: the tree, the states of materialised modules, the lives of lazy ones, the solution of the coupled ones
-//! - [`state`], [`states`]: rule, clause, signs ([`short`]), trajectories and next event of one module, and of all of them
+//! - [`state`], [`states`]: rule, clause, signs and switches ([`marks`], [`short`]), trajectories and next event of one module, and of all of them
+//! - [`trajectories`]: how the parameters of one module move
 //! - [`path`], [`course`]: the variables of a rule along a stretch of time, and at one instant after another
 //! - [`prefetch`]: memory that is asked for before it is read
 //! - [`context`], [`neighbours`]: the modules that a rule reads, and the modules that read one
@@ -11,6 +12,7 @@ pub mod context;
 pub mod coupled_solution;
 pub mod course;
 pub mod life;
+mod marks;
 pub mod neighbours;
 pub mod new_modules;
 pub mod path;
@@ -18,9 +20,9 @@ pub mod prefetch;
 mod short;
 pub mod state;
 pub mod states;
+pub mod trajectories;
 
 use crate::error::{Error, Site};
-use crate::trajectory::Trajectory;
 use context::{Context, gather};
 use coupled_solution::CoupledSolution;
 use dlsys_diagnostic::Span;
@@ -30,6 +32,7 @@ use life::Lives;
 use smallvec::SmallVec;
 use state::State;
 use states::States;
+use trajectories::Law;
 
 /// The instant under examination: that of the last event, or that of an observation.
 #[derive(Clone, Copy, Debug, Default)]
@@ -118,18 +121,18 @@ impl World {
 
     /// A parameter, moving since `state.since` from the value `x`, at an instant.
     #[inline]
-    fn moved(&self, state: &State, trajectory: &Trajectory, x: f64, at: SimTime) -> f64 {
-        match trajectory {
-            Trajectory::Rest => x,
-            Trajectory::Step(component) => match state.step.as_ref().filter(|s| s.live) {
-                Some(step) => step.dense.value(*component as usize, step.dense.position(at)),
+    fn moved(&self, state: &State, law: Law, x: f64, at: SimTime) -> f64 {
+        match law {
+            Law::Rest => x,
+            Law::Step(component) => match state.trajectories.step().filter(|s| s.live) {
+                Some(step) => step.dense.value(component as usize, step.dense.position(at)),
                 None => x,
             },
-            Trajectory::Coupled(component) => match &self.coupled {
-                Some(solution) => solution.value(*component as usize, at).unwrap_or(x),
+            Law::Coupled(component) => match &self.coupled {
+                Some(solution) => solution.value(component as usize, at).unwrap_or(x),
                 None => x,
             },
-            formula => formula.at(x, at.since(state.since).max(0.0)),
+            Law::Formula(formula) => formula.at(x, at.since(state.since).max(0.0)),
         }
     }
 
@@ -140,10 +143,8 @@ impl World {
         match self.state(id).filter(|s| !s.trajectories.is_empty()) {
             None => out.extend_from_slice(values),
             Some(state) => {
-                for (&x, trajectory) in values.iter().zip(&state.trajectories[..]) {
-                    let rests = matches!(trajectory, Trajectory::Rest);
-                    out.push(if rests { x } else { self.moved(state, trajectory, x, at) });
-                }
+                let laws = state.trajectories.iter();
+                out.extend(values.iter().zip(laws).map(|(&x, law)| self.moved(state, law, x, at)));
             }
         }
     }
@@ -152,7 +153,7 @@ impl World {
     pub fn value(&self, id: ModuleId, parameter: usize, at: SimTime) -> f64 {
         let x = self.tree.parameters(id)[parameter];
         let moving = self.state(id).and_then(|s| Some((s, s.trajectories.get(parameter)?)));
-        moving.map_or(x, |(state, trajectory)| self.moved(state, trajectory, x, at))
+        moving.map_or(x, |(state, law)| self.moved(state, law, x, at))
     }
 
     /// Makes the values at an instant those of the tree, and the trajectories begin there, all at rest.
@@ -165,11 +166,11 @@ impl World {
         let places = self.tree.places(id);
         let mut moved: SmallVec<[(usize, f64); 4]> = SmallVec::new();
         let Some(state) = self.state(id) else { return };
-        for ((i, place), trajectory) in places.enumerate().zip(&state.trajectories[..]) {
+        for ((i, place), law) in places.enumerate().zip(state.trajectories.iter()) {
             if let Some(&(_, value)) = given.iter().find(|(parameter, _)| *parameter == i) {
                 moved.push((place, value));
-            } else if !matches!(trajectory, Trajectory::Rest) {
-                moved.push((place, self.moved(state, trajectory, self.tree.values()[place], at)));
+            } else if !matches!(law, Law::Rest) {
+                moved.push((place, self.moved(state, law, self.tree.values()[place], at)));
             }
         }
         for (place, value) in moved {
@@ -177,9 +178,7 @@ impl World {
         }
         let Some(state) = self.state_mut(id) else { return };
         (state.since, state.horizon) = (at, f64::NAN);
-        for trajectory in &mut state.trajectories {
-            *trajectory = Trajectory::Rest;
-        }
+        state.trajectories.rest();
     }
 
     /// The end of the stretch, from an instant on, in which all coupled components that a module reads follow one polynomial.
@@ -189,12 +188,10 @@ impl World {
             return knot;
         }
         for &id in std::iter::once(&state.id).chain(&state.context) {
-            for trajectory in self.state(id).map_or(&[][..], |s| &s.trajectories) {
-                if let Trajectory::Coupled(component) = trajectory {
-                    let end = solution.knot(*component as usize, from);
-                    if end.since(knot) < 0.0 {
-                        knot = end;
-                    }
+            for component in self.state(id).into_iter().flat_map(|s| s.trajectories.coupled()) {
+                let end = solution.knot(component as usize, from);
+                if end.since(knot) < 0.0 {
+                    knot = end;
                 }
             }
         }

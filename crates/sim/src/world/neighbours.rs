@@ -10,6 +10,7 @@
 
 use std::collections::HashMap;
 
+use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
 use crate::world::World;
@@ -40,7 +41,7 @@ impl From<Option<ModuleId>> for Link {
 const LEFT: usize = 0;
 const RIGHT: usize = 1;
 
-/// What is kept in a slot of the tree: 48 bytes, because an event reads it for all modules around it, and they are anywhere
+/// What is kept in a slot of the tree: 40 bytes, because an event reads it for all modules around it, and they are anywhere
 /// in memory.
 #[derive(Clone, Debug)]
 struct Around {
@@ -48,10 +49,16 @@ struct Around {
     generation: u32,
     /// What is known of the neighbours on both sides.
     known: [Known; 2],
+    /// The number of lookers, or [`CROWD`].
+    count: u8,
     /// The neighbours on the sides where there are known ones.
     neighbours: [ModuleId; 2],
-    lookers: SmallVec<[ModuleId; 2]>,
+    lookers: [ModuleId; FEW],
 }
+
+/// So many lookers stand in place. Where there have been more at a time, they are kept in a list, and this is their number.
+const FEW: usize = 2;
+const CROWD: u8 = u8::MAX;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Known {
@@ -63,8 +70,8 @@ enum Known {
 impl Around {
     /// Nothing known of a module.
     fn new(id: ModuleId) -> Around {
-        let (known, lookers) = ([Known::Nothing; 2], SmallVec::new());
-        Around { generation: id.generation(), known, neighbours: [id; 2], lookers }
+        let known = [Known::Nothing; 2];
+        Around { generation: id.generation(), known, count: 0, neighbours: [id; 2], lookers: [id; FEW] }
     }
 
     /// The neighbour on one side.
@@ -93,6 +100,8 @@ impl Around {
 pub struct Neighbours {
     /// By slot of the tree, as far as there are any.
     around: Vec<Around>,
+    /// The lookers of modules that have many, by slot.
+    crowds: FxHashMap<usize, Vec<ModuleId>>,
     /// The left neighbour, now, of the right neighbour of a module that has died at this instant.
     forwards: Forwards,
 }
@@ -206,24 +215,43 @@ impl Neighbours {
 
     /// Remembers that a module looked at another.
     pub fn note(&mut self, tree: &Tree, looker: ModuleId, seen: ModuleId) {
-        let lookers = &mut self.slot(seen).lookers;
-        if lookers.last() == Some(&looker) {
+        if self.lookers(seen).last() == Some(&looker) {
             return;
         }
-        if lookers.len() == lookers.capacity() {
-            lookers.retain(|id| *id != looker && tree.is_alive(*id));
-            if lookers.len() == lookers.capacity() {
-                // Duplicates.
-                lookers.sort_unstable();
-                lookers.dedup();
-            }
+        let around = self.slot(seen);
+        if usize::from(around.count) < FEW {
+            around.lookers[usize::from(around.count)] = looker;
+            around.count += 1;
+            return;
         }
-        lookers.push(looker);
+        if around.count == CROWD {
+            let crowd = self.crowds.get_mut(&seen.slot()).expect("it has many");
+            if crowd.len() == crowd.capacity() {
+                let kept = tidy(tree, looker, crowd);
+                crowd.truncate(kept);
+            }
+            crowd.push(looker);
+            return;
+        }
+        let kept = tidy(tree, looker, &mut around.lookers);
+        if kept < FEW {
+            around.lookers[kept] = looker;
+            around.count = kept as u8 + 1;
+            return;
+        }
+        around.count = CROWD;
+        let mut crowd = Vec::with_capacity(2 * FEW);
+        crowd.extend(around.lookers.into_iter().chain([looker]));
+        self.crowds.insert(seen.slot(), crowd);
     }
 
     /// The lookers of a slot's module, living and dead; some maybe of an earlier module.
     pub fn lookers(&self, id: ModuleId) -> &[ModuleId] {
-        self.around.get(id.slot()).map_or(&[], |around| &around.lookers)
+        match self.around.get(id.slot()) {
+            Some(around) if around.count == CROWD => &self.crowds[&id.slot()],
+            Some(around) => &around.lookers[..usize::from(around.count)],
+            None => &[],
+        }
     }
 
     /// Calls a function with each module whose equations or conditions read something of this one that may change, and
@@ -261,7 +289,10 @@ impl Neighbours {
     /// Removes the lookers of a module that has died.
     pub fn bury(&mut self, id: ModuleId) {
         if let Some(around) = self.around.get_mut(id.slot()) {
-            around.lookers.clear();
+            match around.count {
+                CROWD => self.crowds.get_mut(&id.slot()).expect("it has many").clear(),
+                _ => around.count = 0,
+            }
         }
     }
 
@@ -335,6 +366,30 @@ impl Neighbours {
             self.near(id).set(RIGHT, first.map_or(right, Link::Module));
         }
     }
+}
+
+/// Puts those of a full list of lookers first that are to stay, and gives their number: the living ones without one that looks again, or,
+/// if these are all, each of them once.
+fn tidy(tree: &Tree, again: ModuleId, lookers: &mut [ModuleId]) -> usize {
+    let mut kept = 0;
+    for n in 0..lookers.len() {
+        if lookers[n] != again && tree.is_alive(lookers[n]) {
+            lookers[kept] = lookers[n];
+            kept += 1;
+        }
+    }
+    if kept < lookers.len() {
+        return kept;
+    }
+    lookers.sort_unstable();
+    kept = 0;
+    for n in 0..lookers.len() {
+        if n == 0 || lookers[n] != lookers[kept - 1] {
+            lookers[kept] = lookers[n];
+            kept += 1;
+        }
+    }
+    kept
 }
 
 /// True if the equations or conditions of a module that has looked at another read something of it that may change.

@@ -5,6 +5,7 @@ use super::context::gather;
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::DenseComponent;
 use crate::world::state::State;
+use crate::world::trajectories::Law;
 use dlsys_expr::{Dual, Interval, Value};
 use dlsys_model::{AffineSum, Rule};
 use dlsys_ode::Dense;
@@ -58,15 +59,15 @@ impl<'p> Path<'p> {
     }
 
     /// The dense output that a numeric trajectory follows along this stretch.
-    fn piece<'s>(&'s self, state: &'s State, trajectory: &Trajectory) -> Option<DenseComponent<'s>> {
-        match trajectory {
-            Trajectory::Step(c) => {
+    fn piece<'s>(&'s self, state: &'s State, law: Law) -> Option<DenseComponent<'s>> {
+        match law {
+            Law::Step(c) => {
                 let own = self.step.filter(|_| state.id == self.state.id);
-                let dense = own.or(state.step.as_ref().map(|step| &step.dense))?;
-                Some(DenseComponent::new(dense, *c as usize, self.start, self.h))
+                let dense = own.or(state.trajectories.step().map(|step| &step.dense))?;
+                Some(DenseComponent::new(dense, c as usize, self.start, self.h))
             }
-            Trajectory::Coupled(c) => self.world.coupled.as_ref()?.piece(*c as usize, self.start, self.h),
-            _ => None,
+            Law::Coupled(c) => self.world.coupled.as_ref()?.piece(c as usize, self.start, self.h),
+            Law::Rest | Law::Formula(_) => None,
         }
     }
 
@@ -126,16 +127,16 @@ impl<'p> Path<'p> {
             return out.extend(values.iter().map(|x| rest(*x)));
         };
         let offset = self.start.since(state.since);
-        for (&x, trajectory) in values.iter().zip(&state.trajectories) {
+        for (&x, law) in values.iter().zip(state.trajectories.iter()) {
             let reads = reads(out.len());
-            out.push(match trajectory {
+            out.push(match law {
                 _ if !reads => rest(x),
-                Trajectory::Rest => rest(x),
-                Trajectory::Step(_) | Trajectory::Coupled(_) => match self.piece(state, trajectory) {
+                Law::Rest => rest(x),
+                Law::Step(_) | Law::Coupled(_) => match self.piece(state, law) {
                     Some(along) => piece(&along),
                     None => rest(x),
                 },
-                trajectory => formula(trajectory, x, offset),
+                Law::Formula(trajectory) => formula(trajectory, x, offset),
             });
         }
     }
@@ -174,7 +175,7 @@ impl<'p> Path<'p> {
     /// All variables that equations read at a position.
     pub fn everything_at(&self, position: f64, out: &mut Vec<f64>) {
         self.at(position, out);
-        out.extend(self.state.switches.iter().map(|&on| f64::from(u8::from(on))));
+        out.extend(self.state.marks.switch_values());
     }
 
     /// Bounds of all variables that equations read.
@@ -187,13 +188,13 @@ impl<'p> Path<'p> {
             |trajectory, x, offset| trajectory.within(x, offset + lo * h, offset + hi * h).value,
             |t| Interval::spanned(t + lo * h, t + hi * h),
         );
-        out.extend(self.state.switches.iter().map(|&on| Interval::constant(f64::from(u8::from(on)))));
+        out.extend(self.state.marks.switch_values().map(Interval::constant));
     }
 
     /// The same with the bounds of their rates, per unit of position.
     pub fn everything_along(&self, lo: f64, hi: f64, out: &mut Vec<Dual<Interval>>) {
         self.over(lo, hi, out);
-        out.extend(self.state.switches.iter().map(|&on| Dual::constant(f64::from(u8::from(on)))));
+        out.extend(self.state.marks.switch_values().map(Dual::constant));
     }
 
     /// Bounds of values and rates from one position to another.
@@ -218,8 +219,8 @@ impl<'p> Path<'p> {
             let (id, parameter) = self.place_of(variable)?;
             let state = self.world.state(id);
             match state.and_then(|state| Some((state, state.trajectories.get(parameter)?))) {
-                Some((state, trajectory)) if !matches!(trajectory, Trajectory::Rest) => {
-                    if !self.piece(state, trajectory)?.add_to(factor, &mut moving) {
+                Some((state, law)) if !matches!(law, Law::Rest) => {
+                    if !self.piece(state, law)?.add_to(factor, &mut moving) {
                         return None;
                     }
                 }
@@ -264,7 +265,6 @@ impl<'p> Path<'p> {
 
     /// True if some of these variables is integrated: it follows dense output, or is a sum in which something does.
     pub fn is_integrated(&self, variables: &[usize]) -> bool {
-        let numeric = |trajectory: &Trajectory| !trajectory.is_formula();
         variables.iter().any(|&variable| {
             let aggregate = variable.checked_sub(self.rule.first_aggregate);
             if let Some(number) = aggregate.filter(|number| *number < self.rule.aggregates.len()) {
@@ -272,10 +272,9 @@ impl<'p> Path<'p> {
                 let others = term.iter().copied().filter(|v| *v < self.rule.first_aggregate);
                 let mut children = self.state.context.children(number).iter();
                 return self.is_integrated(&others.collect::<SmallVec<[usize; 8]>>())
-                    || children
-                        .any(|id| self.world.state(*id).is_some_and(|s| s.trajectories.iter().any(numeric)));
+                    || children.any(|id| self.world.state(*id).is_some_and(State::is_numeric));
             }
-            self.law_of(variable).is_some_and(numeric)
+            self.law_of(variable).is_some_and(Law::is_numeric)
         })
     }
 
@@ -293,19 +292,19 @@ impl<'p> Path<'p> {
     }
 
     /// The trajectory of a variable that is a parameter of a module with equations.
-    fn law_of(&self, variable: usize) -> Option<&Trajectory> {
+    fn law_of(&self, variable: usize) -> Option<Law<'_>> {
         let (id, parameter) = self.place_of(variable)?;
         self.world.state(id)?.trajectories.get(parameter)
     }
 
     /// True for a parameter that follows a function of time, which may jump.
     pub fn is_function(&self, variable: usize) -> bool {
-        self.law_of(variable).is_some_and(|law| matches!(law, Trajectory::Function(_)))
+        self.law_of(variable).is_some_and(|law| matches!(law, Law::Formula(Trajectory::Function(_))))
     }
 
     /// False for a variable that is a parameter at rest.
     pub fn moves(&self, variable: usize) -> bool {
-        let rests = self.law_of(variable).is_none_or(|law| matches!(law, Trajectory::Rest));
+        let rests = self.law_of(variable).is_none_or(|law| matches!(law, Law::Rest));
         self.place_of(variable).is_none() || !rests
     }
 
@@ -316,10 +315,10 @@ impl<'p> Path<'p> {
             return solution;
         }
         let error = |state: &State| {
-            let of = |trajectory: &Trajectory| match trajectory {
-                Trajectory::Coupled(_) => solution,
-                Trajectory::Step(_) => state.step.as_ref().map_or(0.0, |step| step.dense.error),
-                _ => 0.0,
+            let of = |law: Law| match law {
+                Law::Coupled(_) => solution,
+                Law::Step(_) => state.trajectories.step().map_or(0.0, |step| step.dense.error),
+                Law::Rest | Law::Formula(_) => 0.0,
             };
             state.trajectories.iter().map(of).fold(0.0, f64::max)
         };

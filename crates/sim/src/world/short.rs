@@ -83,6 +83,19 @@ impl<T: Copy + Default> FromIterator<T> for Short<T> {
     }
 }
 
+impl<T: Copy + Default> From<&[T]> for Short<T> {
+    #[inline]
+    fn from(things: &[T]) -> Short<T> {
+        let count = things.len();
+        if count > FEW {
+            return Short(Kept::Many(Box::new(things.to_vec())));
+        }
+        let mut few = [T::default(); FEW];
+        few[..count].copy_from_slice(things);
+        Short(Kept::Few { count: count as u8, things: few })
+    }
+}
+
 impl<'s, T> IntoIterator for &'s Short<T> {
     type Item = &'s T;
     type IntoIter = std::slice::Iter<'s, T>;

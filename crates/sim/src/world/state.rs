@@ -2,9 +2,10 @@
 
 use smallvec::SmallVec;
 
-use crate::trajectory::Trajectory;
 use crate::world::context::Context;
+use crate::world::marks::Marks;
 use crate::world::short::Short;
+use crate::world::trajectories::{Law, Trajectories};
 use dlsys_model::Sign;
 pub use dlsys_ode::Control;
 use dlsys_ode::Dense;
@@ -24,16 +25,13 @@ pub struct State {
     /// The active clause of it.
     pub solve: Index,
     pub context: Context,
-    /// Conditions inside the active equations.
-    pub switches: Switches,
-    /// The sign of each atom of the rule, just after the last instant at which it was examined.
-    pub signs: Signs,
+    /// The sign of each atom of the rule, just after the last instant at which it was examined, and conditions inside the active
+    /// equations.
+    pub marks: Marks,
     /// When the trajectories began; the values in the tree are those of then.
     pub since: SimTime,
-    /// How each parameter moves; empty means that none does.
-    pub trajectories: SmallVec<[Trajectory; 2]>,
-    /// The module's own step, if it is integrated alone.
-    pub step: Option<Box<Step>>,
+    /// How each parameter moves, and the module's own step.
+    pub trajectories: Trajectories,
     /// How far formulas have been looked at; NaN if they have not. Of a coupled module, the time before which none of them meets a level, which every
     /// step of its neighbours asks for; infinitely early if that is not known. Of any other, the length of the last stretch that was searched.
     pub horizon: f64,
@@ -323,11 +321,9 @@ impl State {
             rule: Index::NONE,
             solve: Index::NONE,
             context: Context::default(),
-            switches: Switches::new(),
-            signs: Signs::new(),
+            marks: Marks::default(),
             since: SimTime::ZERO,
-            trajectories: SmallVec::new(),
-            step: None,
+            trajectories: Trajectories::default(),
             horizon: f64::NAN,
             numeric_only: false,
             coupled: false,
@@ -343,8 +339,9 @@ impl State {
     pub fn renew(&mut self, id: ModuleId) {
         (self.id, self.is_alive) = (id, true);
         self.context.clear();
-        self.switches.clear();
-        (self.step, self.open) = (None, None);
+        self.marks.set_switches(&[]);
+        self.trajectories.end_steps();
+        self.open = None;
         self.next.clear();
         self.horizon = f64::NAN;
         (self.numeric_only, self.coupled) = (false, false);
@@ -382,14 +379,15 @@ impl State {
 
     /// True if some parameter is integrated by the module's own steps.
     pub fn is_numeric(&self) -> bool {
-        self.trajectories.iter().any(|m| !m.is_formula())
+        self.trajectories.iter().any(Law::is_numeric)
     }
 
     /// Opens the module as one that was followed along its trajectory.
     pub fn follow(&mut self) -> &mut Open {
         if self.open.is_none() {
-            let flow = Some((self.solve.get(), self.switches.clone()));
-            let (at, guess) = (self.signs.clone(), self.signs.clone());
+            let flow = Some((self.solve.get(), self.marks.switches()));
+            let at = Signs::from(self.marks.signs());
+            let guess = at.clone();
             self.open = Some(Box::new(Open { at, guess, flow, ..Open::default() }));
         }
         self.open.as_mut().expect("just opened")
@@ -397,14 +395,15 @@ impl State {
 
     /// Opens the module as one whose signs are known from its values only.
     pub fn place(&mut self, clear: bool) {
-        let guess = self.signs.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect();
-        let at = self.signs.clone();
+        let at = Signs::from(self.marks.signs());
+        let guess = at.iter().map(|&s| if s == Sign::Zero { Sign::Any } else { s }).collect();
         self.open = Some(Box::new(Open { at, guess, clear, ..Open::default() }));
     }
 
     /// Takes over the signs that have changed without consequence up to an instant.
     pub fn pass_changes(&mut self, until: SimTime) {
-        let State { next, signs, .. } = self;
+        let State { next, marks, .. } = self;
+        let signs = marks.signs_mut();
         next.pass_changes(until, |change| signs[change.atom()] = change.after);
     }
 }

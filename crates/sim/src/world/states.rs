@@ -49,3 +49,13 @@ impl States {
         self.0.get(slot)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_state_takes_no_more_room_than_is_said() {
+        assert_eq!(size_of::<State>(), 168, "ARCHITECTURE.md says what each part of a coupled module takes");
+    }
+}

@@ -8,10 +8,10 @@
 use crate::flow::coupled::equations::Equations;
 use crate::flow::coupled::lanes::{LaneColumn, ProgramKey};
 use crate::flow::coupled::system::{Membership, REGION, System};
-use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::CoupledSolution;
 use crate::world::prefetch::prefetch;
 use crate::world::state::State;
+use crate::world::trajectories::Law;
 use dlsys_expr::LANES;
 use dlsys_model::{Rule, Solve};
 use smallvec::SmallVec;
@@ -126,10 +126,10 @@ impl System {
                 waiting.push((key, SmallVec::new()));
             }
             let first = clause.stepping.components(state.numeric_only).first();
-            if let Some(Trajectory::Coupled(component)) = first.and_then(|p| state.trajectories.get(*p)) {
+            if let Some(Law::Coupled(component)) = first.and_then(|p| state.trajectories.get(*p)) {
                 self.modules += 1;
                 let rows = &mut waiting[place].1;
-                rows.push((state, unknown(*component).expect("a component of a member")));
+                rows.push((state, unknown(component).expect("a component of a member")));
                 if rows.len() == LANES {
                     self.gather_chunk(rules, modules, (key, rows), (components, &unknown));
                     rows.clear();
@@ -160,7 +160,10 @@ impl System {
             let column = if variable == time {
                 LaneColumn::Time
             } else if let Some(switch) = variable.checked_sub(switches) {
-                self.lanes.numbers(rows.iter().map(|row| f64::from(u8::from(row.0.switches[switch]))))
+                self.lanes.numbers(
+                    rows.iter()
+                        .map(|row| row.0.marks.switch_values().nth(switch).expect("a switch of the clause")),
+                )
             } else {
                 let mut reads = clause.stepping.reads(key.numeric_only).iter();
                 let read = reads.find(|read| read.variable == variable).expect("all that steps read");
@@ -180,7 +183,7 @@ impl System {
             };
             self.lanes.push_column(variable, column);
         }
-        let registers = switches + rows[0].0.switches.len();
+        let registers = switches + rows[0].0.marks.switch_values().count();
         self.lanes.end_chunk(key, registers, rows.iter().map(|row| row.1));
     }
 }

@@ -5,7 +5,7 @@
 
 use crate::flow::FlowStage;
 use crate::flow::coupled::Coupled;
-use crate::flow::coupled::taylor::{LOOSEST, Members};
+use crate::flow::coupled::taylor::{LOOSEST, MANY, Members};
 use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE};
 use crate::schedule::Owner;
 use crate::world::coupled_solution::CoupledSolution;
@@ -62,13 +62,17 @@ impl FlowStage<'_, '_> {
         dense.error = control.error;
         self.log.stats.steps += 1;
         let end = dense.end;
-        let Coupled { system, integrator, linear, tried, reintegrated, .. } = &mut self.flows.coupled;
+        let Coupled { system, integrator, linear, tried, reintegrated, y, .. } = &mut self.flows.coupled;
         system.sections.clear();
         (*tried, *linear) = (false, None);
         integrator.set_unwatched(false);
         integrator.keep_reached(false);
         // The next step begins with the values at the end of this one, which no integrator knows.
         *reintegrated = true;
+        if y.len() > MANY {
+            // Until then they are nothing but memory.
+            *y = Vec::new();
+        }
         self.world.coupled = Some(CoupledSolution::new(dense));
         self.search_all(from);
         self.schedule.schedule(Owner::Coupled, end);

@@ -30,16 +30,17 @@ use crate::detect::examined::{Stages, StagesOfSteps};
 use crate::flow::FlowStage;
 use crate::flow::coupled::columns::{Numbers, Whole};
 use crate::flow::coupled::equations::{Equations, RateWorkspace};
+use crate::flow::coupled::lanes::LaneBatches;
 use crate::flow::coupled::system::{Membership, System, integrated};
-use crate::flow::coupled::taylor::{LOOSEST, Members, Taylor};
+use crate::flow::coupled::taylor::{LOOSEST, MANY, Members, Taylor};
 use crate::flow::integrator::{CERTAINTY, INNER_TOLERANCE, Integrator, StepRequest};
 use crate::schedule::Owner;
-use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::{CoupledSolution, value_of};
 use crate::world::neighbours::reads;
 use crate::world::prefetch::{fetch, is_large};
 use crate::world::state::{Control, State};
 use crate::world::states::States;
+use crate::world::trajectories::Law;
 use dlsys_ode::{Dense, Method};
 use dlsys_tree::{ModuleId, SimTime, room};
 use smallvec::SmallVec;
@@ -285,18 +286,15 @@ impl FlowStage<'_, '_> {
     fn number_newcomers(&mut self, seeds: &[ModuleId]) {
         let known = self.flows.coupled.system.table.places.len();
         for &id in seeds {
-            let fresh = |s: &State| s.trajectories.iter().any(|m| matches!(m, Trajectory::Step(_)));
+            let fresh = |s: &State| s.trajectories.iter().any(|law| matches!(law, Law::Step(_)));
             if !self.world.state(id).is_some_and(fresh) {
                 continue;
             }
             self.store_values(id);
-            let state = self.world.state(id).expect("a seed");
-            for &parameter in integrated(self.setup.model, state) {
-                let solution = self.world.coupled.as_mut().expect("seen above");
-                let component = solution.add(known) as u32;
-                self.world.state_mut(id).expect("a seed").trajectories[parameter] =
-                    Trajectory::Coupled(component);
-            }
+            let parameters = integrated(self.setup.model, self.world.state(id).expect("a seed"));
+            let solution = self.world.coupled.as_mut().expect("seen above");
+            let first = solution.add(known, parameters.len()) as u32;
+            self.world.state_mut(id).expect("a seed").trajectories.couple(parameters, first);
         }
     }
 
@@ -382,7 +380,7 @@ impl FlowStage<'_, '_> {
             }
             let state = self.world.state(id)?;
             for &parameter in integrated(self.setup.model, state) {
-                if let Trajectory::Coupled(component) = state.trajectories[parameter] {
+                if let Some(Law::Coupled(component)) = state.trajectories.get(parameter) {
                     components.push(component);
                     owners.push((id, parameter));
                 }
@@ -500,7 +498,12 @@ impl FlowStage<'_, '_> {
         let all = self.flows.coupled.system.table.places.len();
         let solution: &mut CoupledSolution = self.world.coupled.as_mut().expect("seen above");
         solution.replace(&mut trial.stretches, &trial.components, all);
-        self.flows.coupled.reintegrated = true;
+        let coupled = &mut self.flows.coupled;
+        let is_first = !std::mem::replace(&mut coupled.reintegrated, true);
+        if is_first && !coupled.pending && coupled.members.len() > MANY {
+            // The next step has other equations.
+            coupled.system.lanes = LaneBatches::default();
+        }
         let tolerance = self.setup.coupled_settings.tolerance;
         let known = &mut self.flows.coupled.control.error;
         *known = (*known + INNER_TOLERANCE * tolerance).min(CERTAINTY * tolerance);

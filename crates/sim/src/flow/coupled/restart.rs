@@ -9,11 +9,11 @@ use crate::flow::coupled::rows::ComponentPlace;
 use crate::flow::coupled::sift::AT_A_TIME;
 use crate::flow::coupled::system::{Membership, integrated};
 use crate::schedule::Owner;
-use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::coupled_solution::CoupledSolution;
 use crate::world::prefetch::{Guide, prefetch};
 use crate::world::state::State;
+use crate::world::trajectories::Law;
 use crate::{Method, Scheduler};
 use dlsys_tree::{ModuleId, SimTime, Visit, room};
 
@@ -127,15 +127,17 @@ impl FlowStage<'_, '_> {
         let World { tree, states, .. } = &mut *self.world;
         let state = states.get_mut(id.slot()).expect("a member");
         let first = tree.places(id).start;
-        for &parameter in integrated(self.setup.model, state) {
+        let parameters = integrated(self.setup.model, state);
+        let component = self.flows.coupled.y.len() as u32;
+        for &parameter in parameters {
             let place = first + parameter;
             let value = known.next().or_else(|| present(state, parameter, solution, at));
             let value = value.unwrap_or(tree.values()[place]);
             tree.set_value(place, value);
-            state.trajectories[parameter] = Trajectory::Coupled(self.flows.coupled.y.len() as u32);
             self.flows.coupled.y.push(value);
             self.flows.coupled.system.table.places.push(ComponentPlace::new(first, id, parameter));
         }
+        state.trajectories.couple(parameters, component);
         state.pass_changes(at);
         if !state.next.lasting {
             state.next = state.next.again();
@@ -241,10 +243,10 @@ impl FlowStage<'_, '_> {
 /// The present value of an integrated parameter; None if it is the one in the tree.
 #[inline]
 fn present(state: &State, parameter: usize, solution: Option<&CoupledSolution>, at: SimTime) -> Option<f64> {
-    match state.trajectories[parameter] {
-        Trajectory::Coupled(component) => solution.and_then(|c| c.value(component as usize, at)),
-        Trajectory::Step(component) => {
-            let step = state.step.as_ref().filter(|step| step.live);
+    match state.trajectories.get(parameter)? {
+        Law::Coupled(component) => solution.and_then(|c| c.value(component as usize, at)),
+        Law::Step(component) => {
+            let step = state.trajectories.step().filter(|step| step.live);
             step.map(|step| step.dense.value(component as usize, step.dense.position(at)))
         }
         _ => None,

@@ -6,8 +6,8 @@
 
 use crate::flow::coupled::equations::Equations;
 use crate::flow::coupled::system::{Membership, System};
-use crate::trajectory::Trajectory;
 use crate::world::World;
+use crate::world::trajectories::Law;
 use dlsys_model::Rule;
 use dlsys_ode::{Part, Rates};
 use dlsys_tree::ModuleId;
@@ -85,7 +85,7 @@ fn first_component(rules: &[Rule], world: &World, id: ModuleId) -> Option<usize>
     let clause = &rules[state.rule.get()?].solves[state.solve.get()?];
     let first = *clause.stepping.components(state.numeric_only).first()?;
     match state.trajectories.get(first) {
-        Some(Trajectory::Coupled(component)) => Some(*component as usize),
+        Some(Law::Coupled(component)) => Some(component as usize),
         _ => None,
     }
 }

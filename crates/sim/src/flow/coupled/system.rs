@@ -7,10 +7,10 @@ use crate::flow::coupled::rows::{
     ComponentPlace, EquationRow, EquationTable, FormulaInput, RowAggregate, VariableSource,
 };
 use crate::flow::coupled::sections::Section;
-use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::prefetch::prefetch;
 use crate::world::state::State;
+use crate::world::trajectories::Law;
 use dlsys_model::{Model, Rule, Solve};
 use dlsys_tree::{ModuleId, SimTime, Tree};
 use smallvec::SmallVec;
@@ -162,7 +162,7 @@ impl EquationTable {
         self.aged |= clause.stepping.is_aged();
         let first_rate = self.places.len();
         for &parameter in clause.stepping.components(state.numeric_only) {
-            if let Some(Trajectory::Coupled(_)) = state.trajectories.get(parameter) {
+            if let Some(Law::Coupled(_)) = state.trajectories.get(parameter) {
                 self.places.push(ComponentPlace::new(first, id, parameter));
             }
         }
@@ -176,7 +176,7 @@ impl EquationTable {
         self.sources.resize(first_source + compiled.variables - 2, VariableSource::Fixed(0.0));
         let integrated = rates(clause, state.numeric_only);
         let first_switch = self.switches.len();
-        self.switches.extend(state.switches.iter().map(|&on| f64::from(u8::from(on))));
+        self.switches.extend(state.marks.switch_values());
         // Births stand elsewhere in memory.
         let birth = if clause.stepping.is_aged() { world.tree.birth(id) } else { self.start };
         self.rows.push(EquationRow {
@@ -267,19 +267,19 @@ impl EquationTable {
         unknown: impl Fn(u32) -> Option<u32>,
     ) -> VariableSource {
         let x = || values[place()];
-        let Some((state, trajectory)) = state.and_then(|s| Some((s, s.trajectories.get(parameter)?))) else {
+        let Some((state, law)) = state.and_then(|s| Some((s, s.trajectories.get(parameter)?))) else {
             return VariableSource::Fixed(x());
         };
-        match trajectory {
-            Trajectory::Rest | Trajectory::Step(_) => VariableSource::Fixed(x()),
-            Trajectory::Coupled(component) => match unknown(*component) {
+        match law {
+            Law::Rest | Law::Step(_) => VariableSource::Fixed(x()),
+            Law::Coupled(component) => match unknown(component) {
                 Some(number) => VariableSource::State(number),
                 None => {
-                    self.inputs.push(*component);
+                    self.inputs.push(component);
                     VariableSource::Input(self.inputs.len() as u32 - 1)
                 }
             },
-            trajectory => {
+            Law::Formula(trajectory) => {
                 let place = place() as u32;
                 let mut known = self.formulas.iter().skip(shared);
                 if let Some(number) = known.position(|formula| formula.place == place) {

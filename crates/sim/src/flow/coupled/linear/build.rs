@@ -5,6 +5,7 @@ use crate::flow::coupled::rows::{FormulaInput, VariableSource};
 use crate::flow::coupled::system::{Membership, System};
 use crate::trajectory::{Chain, Trajectory};
 use crate::world::prefetch::prefetch;
+use crate::world::trajectories::Law;
 use dlsys_expr::Scratch;
 use dlsys_model::Rule;
 use smallvec::smallvec;
@@ -92,7 +93,7 @@ impl Linear {
             }
             let mut next = out.iter();
             for (reads, &position) in linear.variables.iter().zip(&clause.numeric) {
-                let Trajectory::Coupled(n) = *state.trajectories.get(clause.of[position])? else {
+                let Law::Coupled(n) = state.trajectories.get(clause.of[position])? else {
                     return None;
                 };
                 problem.b[n as usize] += next.next()?;
@@ -104,12 +105,12 @@ impl Linear {
                         Some(module) => (module, world.state(module)),
                     };
                     match moves.and_then(|state| state.trajectories.get(read.parameter)) {
-                        Some(Trajectory::Coupled(column)) => problem.entries.push((n, *column, coefficient)),
-                        None | Some(Trajectory::Rest | Trajectory::Step(_)) => {
+                        Some(Law::Coupled(column)) => problem.entries.push((n, column, coefficient)),
+                        None | Some(Law::Rest | Law::Step(_)) => {
                             problem.b[n as usize] +=
                                 coefficient * world.tree.parameters(module)[read.parameter];
                         }
-                        Some(_) => return None,
+                        Some(Law::Formula(_)) => return None,
                     }
                 }
             }

@@ -11,10 +11,10 @@
 
 mod rows;
 
-pub use rows::Members;
+pub use rows::{MANY, Members};
 
 use crate::world::coupled_solution::CoupledSolution;
-use dlsys_ode::{Dense, LEAST_DEGREE, MAX_DEGREE, MAX_POWER, economy_error};
+use dlsys_ode::{Dense, Economized, LEAST_DEGREE, MAX_DEGREE, MAX_POWER, economy_error};
 use dlsys_tree::SimTime;
 use rows::{Clauses, Rows};
 use smallvec::SmallVec;
@@ -43,16 +43,16 @@ const LEFT: f64 = 0.5;
 const MOST_HALVINGS: usize = 3;
 /// More pieces than this up to the end of the common step take longer than steps of a pair.
 const MOST_PIECES: usize = 8;
-/// The memory of smaller systems is kept: it stays in the caches.
-const MANY: usize = 4096;
 
 /// Equations, and the memory for their Taylor coefficients.
 #[derive(Clone, Debug, Default)]
 pub struct Taylor {
     clauses: Clauses,
     rows: Rows,
-    /// The Taylor coefficients of all rows, by power, in units of the length of the piece.
+    /// The Taylor coefficients of all rows, in units of the length of the piece, by power in the order of [`Taylor::place`].
     powers: Vec<f64>,
+    /// The ends of the closed forms, whose rows are the last.
+    ends: Vec<f64>,
     /// The length that is to be tried for the next common step; 0 before the first.
     next: f64,
     /// Products of a row and a vector so far.
@@ -140,7 +140,7 @@ impl Taylor {
             self.next = dense.h * if dense.end == end { GROWTH } else { GAIN };
         }
         if self.rows.y.len() > MANY {
-            (self.rows, self.powers) = (Rows::default(), Vec::new());
+            (self.rows, self.powers, self.ends) = Default::default();
         }
         dense
     }
@@ -178,7 +178,7 @@ impl Taylor {
         let error = |degree: usize| (left_out + economy_error(degree, &sizes)) / tolerated;
         let degrees = LEAST_DEGREE..=MAX_DEGREE;
         let degree = degrees.clone().find(|degree| error(*degree) <= 1.0).unwrap_or(MAX_DEGREE);
-        let mut error = error(degree);
+        let (mut error, mut shorter) = (error(degree), 1.0);
         if error.is_nan() {
             // Some component has no size, and nothing is left out.
             return None;
@@ -190,48 +190,82 @@ impl Taylor {
             if !is_fit {
                 return None;
             }
-            let mut factor = 1.0;
-            for power in self.powers.chunks_exact_mut(self.rows.y.len()).skip(1) {
-                factor /= more;
-                power.iter_mut().for_each(|a| *a *= factor);
-            }
-            (parts, error) = (parts * more, 1.0);
+            (parts, error, shorter) = (parts * more, 1.0, more);
         }
         let (h, end) = cut(parts);
-        let n = self.rows.y.len();
-        let mut dense = Dense::of_powers((from, end, h), degree, (&self.powers, n), self.rows.components);
+        let mut dense = self.economize(degree, sizes.len(), (room, shorter)).dense((from, end, h));
         dense.error = tolerance * error;
-        for (row, y) in self.rows.y.iter_mut().enumerate() {
-            *y = match row < self.rows.components {
-                true => *dense.of(row).last()?,
-                false => self.powers.iter().skip(row).step_by(n).sum(),
-            };
-            if !y.is_finite() {
-                return None;
+        let (of_components, of_formulas) = self.rows.y.split_at_mut(self.rows.components);
+        for (component, y) in of_components.iter_mut().enumerate() {
+            *y = *dense.of(component).last()?;
+        }
+        of_formulas.copy_from_slice(&self.ends);
+        self.rows.y.iter().all(|y| y.is_finite()).then_some(dense)
+    }
+
+    /// Polynomials of a degree for those of so many powers along a length, in a piece so many times shorter; their ends, too.
+    /// Of many rows the powers are made once more: all of them would be the most that a large tissue takes.
+    fn economize(&mut self, degree: usize, powers: usize, (room, shorter): (f64, f64)) -> Economized {
+        let (n, components) = (self.rows.y.len(), self.rows.components);
+        let mut economized = Economized::new(degree, components, shorter);
+        self.ends.clear();
+        self.ends.resize(n - components, 0.0);
+        if n <= MANY {
+            economized.add(&self.powers[..powers * n], n);
+            if n == components {
+                return economized;
             }
         }
-        Some(dense)
+        let mut factor = 1.0;
+        for power in 0..powers {
+            if n > MANY && power > 1 {
+                self.differentiate(power, room);
+            }
+            let known = &self.powers[self.place(power) * n..][..n];
+            if n > MANY {
+                economized.add(known, n);
+            }
+            self.ends.iter_mut().zip(&known[components..]).for_each(|(end, a)| *end += factor * a);
+            factor /= shorter;
+        }
+        economized
+    }
+
+    /// Where the coefficients of a power stand. Of many rows, those of the first two are kept, and of the others two at a time.
+    #[inline]
+    fn place(&self, power: usize) -> usize {
+        if self.rows.y.len() > MANY && power > 1 { 2 + power % 2 } else { power }
+    }
+
+    /// Makes the coefficients of a power from those of the one before; see [`Rows::differentiate`].
+    #[inline]
+    fn differentiate(&mut self, power: usize, room: f64) -> [f64; 2] {
+        let n = self.rows.y.len();
+        let [last, next] = [power - 1, power].map(|power| self.place(power) * n);
+        if self.powers.len() < next + n {
+            // There is room for the least number of powers, then for each one more.
+            let least = if n > MANY { 4 } else { LEAST_DEGREE + 1 };
+            self.powers.resize(next.max((least - 1) * n) + n, 0.0);
+        }
+        let (low, high) = self.powers.split_at_mut(last.max(next));
+        let (last, next) = match last < next {
+            true => (&low[last..last + n], &mut high[..n]),
+            false => (&high[..n], &mut low[next..next + n]),
+        };
+        self.products += n as u64;
+        self.rows.differentiate(power - 1, last, next, room)
     }
 
     /// Makes the coefficients of as many powers as count along a length: gives the largest of the components for each power, a bound of all
     /// others together, and [`Taylor::least_scale`].
     fn raise(&mut self, room: f64, tolerance: f64) -> (SmallVec<[f64; MAX_POWER + 1]>, f64, f64) {
-        let n = self.rows.y.len();
         self.powers.clear();
         self.powers.extend_from_slice(&self.rows.y);
         let (mut sizes, mut scale) = (SmallVec::new(), 0.0);
         // That of the values counts nowhere.
         sizes.push(0.0);
         for power in 1..=MAX_POWER {
-            let room_for = if power <= LEAST_DEGREE { LEAST_DEGREE + 1 } else { power + 1 };
-            if n > MANY {
-                self.powers.reserve_exact(room_for * n - self.powers.len());
-            }
-            self.powers.resize(room_for * n, 0.0);
-            let (known, next) = self.powers.split_at_mut(power * n);
-            let last = &known[(power - 1) * n..];
-            let [size, all] = self.rows.differentiate(power - 1, last, &mut next[..n], room);
-            self.products += n as u64;
+            let [size, all] = self.differentiate(power, room);
             sizes.push(size);
             if power == 1 {
                 scale = self.least_scale(1.0);
@@ -281,4 +315,38 @@ fn falls(dense: &Dense) -> bool {
 /// The part of what is tolerated of a step that a piece may have.
 fn share(tolerance: f64) -> f64 {
     (SHARE * tolerance).max(ROUNDING).min(tolerance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_many_rows_few_powers_and_coefficients_are_kept_with_the_same_result() {
+        const CELLS: usize = MANY / 2 + 1;
+        let mut shorter = [0, 0];
+        for (length, digits) in (1..=5).flat_map(|length| (3..=12).map(move |digits| (length, digits))) {
+            let (end, tolerance) = (SimTime::new(3.0 * f64::from(length)), 0.1f64.powi(digits));
+            let solve = |filaments: usize| {
+                let rows = Rows::of_filaments(filaments, CELLS);
+                let mut taylor = Taylor { rows, ..Taylor::default() };
+                let span = Span { from: SimTime::ZERO, end: Some(end), solution: None, tolerance };
+                taylor.piece(span).map(|dense| (dense, taylor))
+            };
+            let (one, two) = (solve(1), solve(2));
+            assert_eq!(one.is_some(), two.is_some(), "{length}, {digits}");
+            let (Some((one, few)), Some((two, many))) = (one, two) else { continue };
+            assert_eq!((one.start, one.end, one.h, one.error), (two.start, two.end, two.h, two.error));
+            for cell in 0..CELLS {
+                assert_eq!([two.of(cell), two.of(CELLS + cell)], [one.of(cell); 2], "cell {cell}");
+            }
+            // The ends, with those of the closed forms.
+            assert_eq!(many.rows.y[2 * CELLS..], [few.rows.y[CELLS]; 2]);
+            assert_eq!(many.rows.y[CELLS..2 * CELLS], few.rows.y[..CELLS]);
+            assert_eq!(many.powers.len(), 4 * many.rows.y.len());
+            assert!(few.rows.kept() == CELLS + 1 && many.rows.kept() < CELLS, "{}", many.rows.kept());
+            shorter[usize::from(one.end.since(end) < 0.0)] += 1;
+        }
+        assert!(shorter.iter().all(|count| *count > 0), "{shorter:?}");
+    }
 }

@@ -6,13 +6,17 @@ use crate::trajectory::Trajectory;
 use crate::world::World;
 use crate::world::prefetch::prefetch;
 use crate::world::state::State;
+use crate::world::trajectories::Law;
 use dlsys_expr::Scratch;
 use dlsys_model::{Read, Rule};
 use dlsys_ode::MAX_DEGREE;
 use dlsys_tree::{ModuleId, SimTime};
 use std::ops::Range;
 
-/// A formula is looked for among so many that were met last: neighbours in the string read the same.
+/// The memory of smaller systems is kept, and holds all there is of each row and each power: it stays in the caches.
+pub const MANY: usize = 4096;
+/// A formula, and coefficients, are looked for among so many that were met last: neighbours in the string read the same, and have the
+/// same equations.
 const RECENT: usize = 4;
 /// Entries of a row side by side: those of a cell in a filament.
 const SIDE_BY_SIDE: usize = 3;
@@ -49,11 +53,25 @@ pub struct Input {
     pub powers: [f64; MAX_DEGREE + 1],
 }
 
-/// A row of A: no loop is needed over its entries, of which those that are not there are zero.
+/// The columns of a row of A: no loop is needed over its entries, of which those that are not there are zero.
+type Columns = [u32; SIDE_BY_SIDE];
+
+/// The numbers of a row.
 #[derive(Clone, Copy, Debug, Default)]
-struct Row {
-    columns: [u32; SIDE_BY_SIDE],
+struct Coefficients {
     values: [f64; SIDE_BY_SIDE],
+    constant: f64,
+}
+
+impl Coefficients {
+    /// True if the others are the same, to the last bit.
+    #[inline]
+    fn are(&self, others: &Coefficients) -> bool {
+        let is = |a: f64, b: f64| a.to_bits() == b.to_bits();
+        let [a, b, c] = self.values;
+        let [of_a, of_b, of_c] = others.values;
+        is(b, of_b) && is(a, of_a) && is(c, of_c) && is(self.constant, others.constant)
+    }
 }
 
 /// Modules whose equations are solved together, in the order of their components.
@@ -89,10 +107,13 @@ pub type Clauses = Vec<Vec<Option<Option<LinearClause>>>>;
 /// The rows of A, those of closed forms last, and what else is in the equations.
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
-    rows: Vec<Row>,
+    rows: Vec<Columns>,
+    coefficients: Vec<Coefficients>,
+    /// By row, of many: the number of its coefficients. Most modules share them, and memory is what limits large tissues. Of few rows, each
+    /// has its own.
+    shared: Vec<u32>,
     /// Entries that the rows have no room for: row, column and value.
     others: Vec<(u32, u32, f64)>,
-    constants: Vec<f64>,
     /// What is read from outside.
     pub inputs: Vec<Input>,
     /// Closed forms: where the parameter stands in the tree, and its row.
@@ -101,7 +122,7 @@ pub struct Rows {
     links: Vec<(f64, Option<f64>)>,
     /// The variables of a module, its coefficients, and registers.
     variables: Vec<f64>,
-    coefficients: Vec<f64>,
+    evaluated: Vec<f64>,
     scratch: Scratch<f64>,
     /// The values of all rows: at first those at the start.
     pub y: Vec<f64>,
@@ -115,10 +136,11 @@ impl Rows {
     /// Writes the equations of modules, given the values of their components; None if some are not linear with constant coefficients.
     pub fn write(&mut self, clauses: &mut Clauses, all: Members, y: &[f64], now: SimTime) -> Option<()> {
         let Members { world, rules, .. } = all;
-        let Rows { rows, others, constants, inputs, formulas, links, .. } = self;
+        let Rows { rows, coefficients, shared, others, inputs, formulas, links, .. } = self;
         rows.clear();
         others.clear();
-        constants.clear();
+        coefficients.clear();
+        shared.clear();
         inputs.clear();
         formulas.clear();
         links.clear();
@@ -126,7 +148,6 @@ impl Rows {
         self.y.clear();
         self.y.extend_from_slice(y);
         self.rows.reserve_exact(y.len());
-        self.constants.reserve_exact(y.len());
         for (at, &id) in all.members.iter().enumerate() {
             if all.numbers.is_none() {
                 prefetch(world, all.members, at);
@@ -158,15 +179,16 @@ impl Rows {
             if inflow.is_none() {
                 self.add(row, &mut count, (row + 1, 1.0));
             }
+            self.finish();
         }
         if self.rows.len() != self.y.len() {
             return None;
         }
-        let sum = |row: &Row| row.values.iter().map(|a| a.abs()).sum::<f64>();
-        self.norm = self.rows.iter().map(sum).fold(0.0, f64::max);
+        let sum = |of: &Coefficients| of.values.iter().map(|a| a.abs()).sum::<f64>();
+        self.norm = self.coefficients.iter().map(sum).fold(0.0, f64::max);
         for others in self.others.chunk_by(|a, b| a.0 == b.0) {
             let more: f64 = others.iter().map(|other| other.2.abs()).sum();
-            self.norm = self.norm.max(sum(&self.rows[others[0].0 as usize]) + more);
+            self.norm = self.norm.max(sum(self.coefficients_of(others[0].0)) + more);
         }
         self.norm.is_finite().then_some(())
     }
@@ -180,25 +202,25 @@ impl Rows {
         (rule, solve): (&Rule, usize),
     ) -> Option<()> {
         self.variables.clear();
-        self.variables.resize(rule.variables + state.switches.len(), 0.0);
+        self.variables.resize(rule.variables + rule.solves[solve].switches.len(), 0.0);
         for source in &clause.sources {
             match *source {
                 Source::Parameter(read) => {
                     let (module, moves) = all.module(state, read);
-                    let trajectory = moves.and_then(|state| state.trajectories.get(read.parameter));
-                    if !matches!(trajectory, None | Some(Trajectory::Rest)) {
+                    let law = moves.and_then(|state| state.trajectories.get(read.parameter));
+                    if !matches!(law, None | Some(Law::Rest)) {
                         return None;
                     }
                     self.variables[read.variable] = all.world.tree.parameters(module)[read.parameter];
                 }
                 Source::Switch(variable, switch) => {
-                    self.variables[variable] = f64::from(u8::from(state.switches[switch]));
+                    self.variables[variable] = state.marks.switch_values().nth(switch)?;
                 }
             }
         }
         let program = &rule.solves[solve].linear.as_ref()?.coefficients;
-        self.coefficients.resize(program.outputs(), 0.0);
-        program.eval(&self.variables, &mut self.scratch, &mut self.coefficients);
+        self.evaluated.resize(program.outputs(), 0.0);
+        program.eval(&self.variables, &mut self.scratch, &mut self.evaluated);
         Some(())
     }
 
@@ -213,36 +235,38 @@ impl Rows {
         now: SimTime,
     ) -> Option<()> {
         let world = all.world;
-        let constant = own.as_ref().map_or(equation.constant, |own| self.coefficients[own.start]);
+        let constant = own.as_ref().map_or(equation.constant, |own| self.evaluated[own.start]);
         let (row, mut count) = (self.begin(constant), 0);
-        let Trajectory::Coupled(component) = *state.trajectories.get(equation.parameter)? else {
+        let Law::Coupled(component) = state.trajectories.get(equation.parameter)? else {
             return None;
         };
         if all.number(component) != Some(row) {
             return None;
         }
         for (n, &(read, coefficient)) in equation.terms.iter().enumerate() {
-            let coefficient = own.as_ref().map_or(coefficient, |own| self.coefficients[own.start + 1 + n]);
+            let coefficient = own.as_ref().map_or(coefficient, |own| self.evaluated[own.start + 1 + n]);
             let (module, moves) = all.module(state, read);
             let place = || world.tree.places(module).start + read.parameter;
             let moves = moves.and_then(|state| Some((state, state.trajectories.get(read.parameter)?)));
             match moves {
-                None | Some((_, Trajectory::Rest | Trajectory::Step(_))) => {
-                    self.constants[row as usize] += coefficient * world.tree.values()[place()];
+                None | Some((_, Law::Rest | Law::Step(_))) => {
+                    let more = coefficient * world.tree.values()[place()];
+                    self.coefficients.last_mut().expect("the row has been begun").constant += more;
                 }
-                Some((_, &Trajectory::Coupled(component))) => match all.number(component) {
+                Some((_, Law::Coupled(component))) => match all.number(component) {
                     Some(column) => self.add(row, &mut count, (column, coefficient)),
                     None => {
                         let powers = [0.0; MAX_DEGREE + 1];
                         self.inputs.push(Input { row, component, coefficient, powers });
                     }
                 },
-                Some((of, trajectory)) => {
+                Some((of, Law::Formula(trajectory))) => {
                     let column = self.formula(trajectory, place(), world, now.since(of.since))?;
                     self.add(row, &mut count, (column, coefficient));
                 }
             }
         }
+        self.finish();
         Some(())
     }
 
@@ -263,26 +287,69 @@ impl Rows {
 
     /// Begins the next row with its constant, and gives its number.
     fn begin(&mut self, constant: f64) -> u32 {
-        self.rows.push(Row::default());
-        self.constants.push(constant);
+        self.rows.push(Columns::default());
+        self.coefficients.push(Coefficients { constant, ..Coefficients::default() });
         self.rows.len() as u32 - 1
     }
 
     /// Adds an entry, by column and value, to the row that was begun last, which has so many.
+    #[inline]
     fn add(&mut self, row: u32, count: &mut usize, (column, value): (u32, f64)) {
-        let place = &mut self.rows[row as usize];
-        if *count < SIDE_BY_SIDE {
-            (place.columns[*count], place.values[*count]) = (column, value);
-            *count += 1;
-        } else {
-            self.others.push((row, column, value));
+        match self.coefficients.last_mut() {
+            Some(last) if *count < SIDE_BY_SIDE => {
+                (self.rows[row as usize][*count], last.values[*count]) = (column, value);
+                *count += 1;
+            }
+            _ => self.others.push((row, column, value)),
         }
+    }
+
+    /// Ends the row that was begun last.
+    #[inline]
+    fn finish(&mut self) {
+        if self.components > MANY {
+            self.share();
+        }
+    }
+
+    /// Lets it have the coefficients of an earlier row, if that has the same.
+    fn share(&mut self) {
+        let Some(own) = self.coefficients.pop() else { return };
+        let mut recent = self.coefficients.iter().enumerate().rev().take(RECENT);
+        let known = recent.find(|known| known.1.are(&own)).map(|known| known.0);
+        self.shared.push(known.unwrap_or(self.coefficients.len()) as u32);
+        if known.is_none() {
+            self.coefficients.push(own);
+        }
+    }
+
+    fn coefficients_of(&self, row: u32) -> &Coefficients {
+        &self.coefficients[self.shared.get(row as usize).map_or(row, |shared| *shared) as usize]
     }
 
     /// Makes the Taylor coefficients of the next power after `power`, given those of that; gives the largest of the components, and of all.
     pub fn differentiate(&self, power: usize, last: &[f64], next: &mut [f64], room: f64) -> [f64; 2] {
+        let all = &self.coefficients[..];
+        match self.shared.is_empty() {
+            true => self.differentiate_by(|row| &all[row], power, last, next, room),
+            false => self.differentiate_by(|row| &all[self.shared[row] as usize], power, last, next, room),
+        }
+    }
+
+    /// The same with the coefficients of each row.
+    #[inline]
+    fn differentiate_by<'c>(
+        &self,
+        of: impl Fn(usize) -> &'c Coefficients,
+        power: usize,
+        last: &[f64],
+        next: &mut [f64],
+        room: f64,
+    ) -> [f64; 2] {
         if power == 0 {
-            next.copy_from_slice(&self.constants);
+            for (row, next) in next.iter_mut().enumerate() {
+                *next = of(row).constant;
+            }
         } else {
             next.fill(0.0);
         }
@@ -292,20 +359,29 @@ impl Rows {
         for &(row, column, a) in &self.others {
             next[row as usize] += a * last[column as usize];
         }
-        let factor = room / (power + 1) as f64;
-        let (components, formulas) = next.split_at_mut(self.components);
-        let (rows, others) = self.rows.split_at(self.components);
-        let size = multiply(rows, last, factor, components);
-        [size, size.max(multiply(others, last, factor, formulas))]
+        let (factor, first) = (room / (power + 1) as f64, self.components);
+        let (components, formulas) = next.split_at_mut(first);
+        let (rows, others) = self.rows.split_at(first);
+        let size = multiply(rows, &of, last, factor, components);
+        let others = multiply(others, |row| of(first + row), last, factor, formulas);
+        [size, size.max(others)]
     }
 }
 
-/// Adds the products of rows and a vector to what is there, multiplies it by a factor, and gives the largest.
-fn multiply(rows: &[Row], x: &[f64], factor: f64, out: &mut [f64]) -> f64 {
+/// Adds the products of rows and a vector to what is there, multiplies it by a factor, and gives the largest. `of` gives the coefficients of a
+/// row.
+#[inline]
+fn multiply<'c>(
+    rows: &[Columns],
+    of: impl Fn(usize) -> &'c Coefficients,
+    x: &[f64],
+    factor: f64,
+    out: &mut [f64],
+) -> f64 {
     // Numbers that are not negative have the order of their bits.
     let mut largest = 0;
     for (row, out) in out.iter_mut().enumerate() {
-        let Row { columns: [a, b, c], values: [of_a, of_b, of_c] } = &rows[row];
+        let ([a, b, c], [of_a, of_b, of_c]) = (&rows[row], &of(row).values);
         let sum = *out + of_a * x[*a as usize] + of_b * x[*b as usize] + of_c * x[*c as usize];
         *out = factor * sum;
         largest = largest.max(out.abs().to_bits());
@@ -358,4 +434,42 @@ fn linear_clause(rule: &Rule, solve: usize) -> Option<LinearClause> {
     });
     let equations: Option<Box<[LinearEquation]>> = equations.collect();
     Some(LinearClause { equations: equations?, sources: sources? })
+}
+
+#[cfg(test)]
+impl Rows {
+    /// Filaments that are all alike, of so many cells each, which diffuse; at one end of each is a closed form.
+    pub fn of_filaments(filaments: usize, cells: usize) -> Rows {
+        let components = filaments * cells;
+        let mut rows = Rows { components, norm: 0.16, ..Rows::default() };
+        for filament in 0..filaments {
+            let start = filament * cells;
+            rows.y.extend((0..cells).map(|cell| 120.0 + 90.0 * (cell as f64).sin()));
+            for cell in 0..cells {
+                let (row, mut count) = (rows.begin(if cell % 7 == 0 { 0.5 } else { 0.0 }), 0);
+                let left = if cell == 0 { components + filament } else { start + cell - 1 };
+                rows.add(row, &mut count, (left as u32, 0.03));
+                rows.add(row, &mut count, (row, -0.09));
+                if cell + 1 < cells {
+                    rows.add(row, &mut count, (row + 1, 0.03));
+                }
+                if cell % 5 == 2 {
+                    rows.add(row, &mut count, (row - 2, 1e-3));
+                }
+                rows.finish();
+            }
+        }
+        for _ in 0..filaments {
+            let (row, mut count) = (rows.begin(30.0), 0);
+            rows.add(row, &mut count, (row, -0.15));
+            rows.finish();
+            rows.y.push(20.0);
+        }
+        rows
+    }
+
+    /// How many different coefficients are kept.
+    pub fn kept(&self) -> usize {
+        self.coefficients.len()
+    }
 }
