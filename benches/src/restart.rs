@@ -3,11 +3,12 @@
 //! Without closed form: x' = 1 + sin(x)/2 from 0, back to 0 at x = 3. The time of one life is known nevertheless:
 //! the integral of dx/(1 + a sin x) is 2/q atan((tan(x/2) + a)/q) with q = sqrt(1 - a^2) (Gradshteyn and Ryzhik,
 //! 2.551.3). A shorter life, with fewer steps in it: x' = 2 (1 - x/3) x + sin(x)/10 from 1, back to 1 at x = 2; its
-//! time is a quadrature. Lives that begin with the same value are known from one before, so there are also some that do not. In closed form: the logistic apex x' = 2 (1 - x/3) x, 1 to 2; its life is ln 2.
+//! time is a quadrature. Lives that begin with the same value are known from one before, so there are also some that do not, and some whose rates differ. In closed form: the logistic apex x' = 2 (1 - x/3) x, 1 to 2; its life is ln 2.
 //!
 //! The error is that of one life in units of time: the time of the last event, less its exact value, divided by
 //! the number of events. The lives are all alike, so nothing averages out; at the threshold x grows at about unit
-//! speed in both cases (1.07 and 1.33), so this is about the error in x as well.
+//! speed in both cases (1.07 and 1.33), so this is about the error in x as well. Lives that begin with other values run along
+//! one orbit; those whose rates differ are integrated each for itself.
 
 use std::hint::black_box;
 
@@ -25,8 +26,19 @@ use crate::{measure, solver, tune};
 /// Events in one run.
 pub const EVENTS: usize = 10_000;
 
-/// The difference of the values with which two lives begin that are to differ: a few roundings.
+/// The difference of the values, or rates, with which two lives begin that are to differ: a few roundings.
 const SHIFT: f64 = 1e-15;
+
+/// What tells lives apart, by less than counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Differ {
+    /// Nothing: they are known from the first.
+    Not,
+    /// Each begins with another value: they run along one orbit.
+    InStart,
+    /// Each has another rate, so that no life is known from one before.
+    InRate,
+}
 
 /// An equation with its start and its threshold.
 #[derive(Clone, Copy, Debug)]
@@ -37,8 +49,7 @@ pub struct Life {
     rate: fn(f64) -> f64,
     start: f64,
     threshold: f64,
-    /// Each life begins with another value, by less than counts, so that no life is known from one before.
-    differ: bool,
+    differ: Differ,
     /// Exact duration.
     pub duration: f64,
 }
@@ -53,7 +64,7 @@ pub fn sine() -> Life {
         rate: |x| 1.0 + 0.5 * x.sin(),
         start: 0.0,
         threshold: 3.0,
-        differ: false,
+        differ: Differ::Not,
         duration: antiderivative(3.0) - antiderivative(0.0),
     }
 }
@@ -66,7 +77,7 @@ pub fn short() -> Life {
         rate: |x| 2.0 * (1.0 - x / 3.0) * x + 0.1 * x.sin(),
         start: 1.0,
         threshold: 2.0,
-        differ: false,
+        differ: Differ::Not,
         duration: 0.0,
     };
     Life { duration: quadrature(&life), ..life }
@@ -91,24 +102,30 @@ pub fn logistic() -> Life {
         rate: |x| 2.0 * (1.0 - x / 3.0) * x,
         start: 1.0,
         threshold: 2.0,
-        differ: false,
+        differ: Differ::Not,
         duration: std::f64::consts::LN_2,
     }
 }
 
 impl Life {
     /// The same with lives that differ.
-    pub fn differing(self) -> Life {
-        Life { differ: true, ..self }
+    pub fn differing(self, differ: Differ) -> Life {
+        Life { differ, ..self }
     }
 
     /// The model in dlsys's language.
     pub fn text(&self) -> String {
         let Life { law, start, threshold, .. } = self;
-        if self.differ {
+        let (rate, first) = match self.differ {
+            Differ::Not => (None, None),
+            Differ::InStart => (None, Some(format!("{start} + {SHIFT}*n"))),
+            Differ::InRate => (Some(format!("{law} + {SHIFT}*n")), Some(start.to_string())),
+        };
+        if let Some(first) = first {
+            let law = rate.as_deref().unwrap_or(law);
             return format!(
                 "initial string: A({start}, 0)\nA(x, n):\n  if x < {threshold} solve dx/dt = {law}\n  \
-                 if x = {threshold} produce A({start} + {SHIFT}*n, n + 1)\n"
+                 if x = {threshold} produce A({first}, n + 1)\n"
             );
         }
         format!(

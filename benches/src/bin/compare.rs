@@ -9,7 +9,7 @@ use dlsys::sim::Method as Ours;
 use dlsys_benches::anabaena::{self, Anabaena};
 use dlsys_benches::filament::{self, Coupling, D_SLOW, D_STIFF, Filament};
 use dlsys_benches::measure::{self, Race, Spread, duration};
-use dlsys_benches::restart::{self, Best, EVENTS, Life};
+use dlsys_benches::restart::{self, Best, Differ, EVENTS, Life};
 use dlsys_benches::solver::{Candidate, Dlsys, Method};
 use dlsys_benches::transport;
 use dlsys_benches::tune::{self, Tuned};
@@ -139,7 +139,10 @@ fn restarts(rows: &mut Vec<Row>) -> Result<(), String> {
         for life in [restart::sine(), restart::short()] {
             let theirs = loops(&life, target)?;
             rows.push(race_restarts(&life, target, &theirs, 1.0, " (alike)")?);
-            rows.push(race_restarts(&life.differing(), target, &theirs, 1.0, " (all different)")?);
+            for (differ, note) in [(Differ::InStart, " (starts differ)"), (Differ::InRate, " (rates differ)")]
+            {
+                rows.push(race_restarts(&life.differing(differ), target, &theirs, 1.0, note)?);
+            }
             numeric.push(theirs);
         }
         // The closed form: against diffsol on the same equation, and on the shorter one that has no closed form.
