@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::{Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Part, Unary, Value};
+use super::{Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Part, Program, Unary, Value};
 
 /// An expression in a [`Graph`]. Two expressions of the same graph that are built alike are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -60,6 +60,8 @@ pub struct Graph {
     fields: Vec<FieldSlot>,
     /// Expressions whose antiderivative by another one is known.
     integrals: NodeMap<Integral>,
+    /// Programs so far, by the number of their variables and by their roots.
+    programs: FxHashMap<usize, FxHashMap<Box<[NodeId]>, Program>>,
 }
 
 /// An antiderivative of an expression: the expression is the derivative of `whole` by `argument`.
@@ -90,6 +92,17 @@ impl Graph {
         self.nodes.push(node);
         self.ids.insert(node, id);
         id
+    }
+
+    /// The program of these roots ([`Program::compile`]), compiled once for all who ask for it: rules that differ in names only have the
+    /// same expressions.
+    pub fn program(&mut self, roots: &[NodeId], variables: usize) -> Program {
+        if let Some(known) = self.programs.get(&variables).and_then(|known| known.get(roots)) {
+            return known.clone();
+        }
+        let program = Program::compile(self, roots, variables);
+        self.programs.entry(variables).or_default().insert(roots.into(), program.clone());
+        program
     }
 
     /// Adds a curve.

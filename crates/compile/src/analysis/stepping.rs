@@ -6,6 +6,7 @@ use dlsys_model::{Algebraic, Jacobian, LinearRates, Read, SolutionForm, Stepping
 use super::ResolvedRule;
 
 /// The layout of the variables of a rule.
+#[derive(Clone, PartialEq, Eq, Hash)]
 pub struct VariableLayout {
     /// Number of the module's own parameters.
     own: usize,

@@ -7,7 +7,7 @@ use rustc_hash::FxHashSet;
 
 use crate::ast;
 use crate::ast::{
-    Action, Alternative, Clause, Conditional, ContextPart, Equation, Expr, ExprId, Expression, Expressions,
+    Action, Alternative, Clause, Conditional, ContextPart, Equation, Expr, Expression, Expressions,
     HeadModule, Item, Module, Name, Part, Repetition, Text,
 };
 use crate::grammar::{Pair, Rule};
@@ -153,9 +153,7 @@ impl Builder<'_> {
             }
         }
         let predecessor = predecessor.expect("the grammar has a predecessor here");
-        let nodes = (ExprId(0), ExprId(0));
-        let (locals, clauses) = (Vec::new(), Vec::new());
-        ast::Rule { left, predecessor, right, right_shape, head, discrete: false, locals, clauses, nodes }
+        ast::Rule::of_head(left, predecessor, (right, right_shape), head)
     }
 
     fn clause(&mut self, pair: Pair) -> Built<Clause> {
