@@ -340,16 +340,25 @@ impl Program {
 
     /// The variables that one output depends on, ascending.
     pub fn output_reads(&self, output: usize) -> Vec<usize> {
-        let Some(&register) = self.0.outputs.get(output) else { return Vec::new() };
+        let wanted = self.trace(output, |_| {});
+        (0..self.0.variables).filter(|variable| wanted[*variable]).collect()
+    }
+
+    /// Visits the instructions that an output is made by, from the last to the first. By register: true if the output depends on what is in it
+    /// before the first one.
+    fn trace(&self, output: usize, mut visit: impl FnMut(&Instruction)) -> Vec<bool> {
         let mut wanted = vec![false; self.0.registers];
-        wanted[register as usize] = true;
+        if let Some(&register) = self.0.outputs.get(output) {
+            wanted[register as usize] = true;
+        }
         for instruction in self.0.code.iter().rev() {
             if std::mem::take(&mut wanted[instruction.destination() as usize]) {
+                visit(instruction);
                 let operands = instruction.operands().into_iter().flatten();
                 operands.for_each(|operand| wanted[operand as usize] = true);
             }
         }
-        (0..self.0.variables).filter(|variable| wanted[*variable]).collect()
+        wanted
     }
 
     /// The variables that decide over something that jumps: a whole part or a sign, a comparison, the element of an array or the piece
@@ -389,17 +398,11 @@ impl Program {
 
     /// True if one output is made of something that jumps.
     pub fn output_jumps(&self, output: usize) -> bool {
-        let Some(&register) = self.0.outputs.get(output) else { return false };
-        let mut wanted = vec![false; self.0.registers];
-        wanted[register as usize] = true;
-        self.0.code.iter().rev().any(|instruction| {
-            let is_part = std::mem::take(&mut wanted[instruction.destination() as usize]);
-            if is_part {
-                let operands = instruction.operands().into_iter().flatten();
-                operands.for_each(|operand| wanted[operand as usize] = true);
-            }
-            is_part && self.jumps_over(instruction).iter().any(Option::is_some)
-        })
+        let mut jumps = false;
+        self.trace(output, |instruction| {
+            jumps |= self.jumps_over(instruction).iter().any(Option::is_some);
+        });
+        jumps
     }
 
     /// The operands over which an instruction jumps.

@@ -69,20 +69,6 @@ pub struct Rule {
     pub nodes: (ExprId, ExprId),
 }
 
-impl Rule {
-    /// A continuous rule that has its head alone so far.
-    pub(crate) fn of_head(
-        left: Vec<HeadModule>,
-        predecessor: HeadModule,
-        (right, right_shape): (Vec<HeadModule>, Vec<ContextPart>),
-        head: Span,
-    ) -> Rule {
-        let nodes = (ExprId(0), ExprId(0));
-        let (locals, clauses) = (Vec::new(), Vec::new());
-        Rule { left, predecessor, right, right_shape, head, discrete: false, locals, clauses, nodes }
-    }
-}
-
 /// A clause of a rule.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clause {

@@ -29,7 +29,7 @@ impl VariableLayout {
     }
 }
 
-/// The equations of a clause; the fields are those of [`dlsys_model::Solve`].
+/// The equations of a clause; the fields are those of [`dlsys_model::Equations`].
 pub struct StepEquations<'e> {
     pub of: &'e [usize],
     pub rates: &'e Program,

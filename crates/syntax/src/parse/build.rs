@@ -7,7 +7,7 @@ use rustc_hash::FxHashSet;
 
 use crate::ast;
 use crate::ast::{
-    Action, Alternative, Clause, Conditional, ContextPart, Equation, Expr, Expression, Expressions,
+    Action, Alternative, Clause, Conditional, ContextPart, Equation, Expr, ExprId, Expression, Expressions,
     HeadModule, Item, Module, Name, Part, Repetition, Text,
 };
 use crate::grammar::{Pair, Rule};
@@ -153,7 +153,7 @@ impl Builder<'_> {
             }
         }
         let predecessor = predecessor.expect("the grammar has a predecessor here");
-        ast::Rule::of_head(left, predecessor, (right, right_shape), head)
+        with_head(left, predecessor, (right, right_shape), head)
     }
 
     fn clause(&mut self, pair: Pair) -> Built<Clause> {
@@ -309,6 +309,18 @@ impl Builder<'_> {
         }
         Ok(Module { name, span, arguments })
     }
+}
+
+/// A continuous rule that has its head alone so far.
+pub(super) fn with_head(
+    left: Vec<HeadModule>,
+    predecessor: HeadModule,
+    (right, right_shape): (Vec<HeadModule>, Vec<ContextPart>),
+    head: Span,
+) -> ast::Rule {
+    let nodes = (ExprId(0), ExprId(0));
+    let (locals, clauses) = (Vec::new(), Vec::new());
+    ast::Rule { left, predecessor, right, right_shape, head, discrete: false, locals, clauses, nodes }
 }
 
 /// True for signs and words that carry no information after parsing.

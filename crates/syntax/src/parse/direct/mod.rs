@@ -10,7 +10,7 @@ mod scan;
 #[cfg(test)]
 mod tests;
 
-use super::build::Builder;
+use super::build::{Builder, with_head};
 use crate::ast::{
     self, Action, Alternative, Clause, ContextPart, Equation, Expression, HeadModule, Item, Module, Name,
     Part,
@@ -206,7 +206,7 @@ impl<'t> Direct<'t, '_, '_> {
             }
         }
         let shape = vec![ContextPart::Module; right.len()];
-        Some(ast::Rule::of_head(left, predecessor, (right, shape), self.span_from(start)))
+        Some(with_head(left, predecessor, (right, shape), self.span_from(start)))
     }
 
     fn rule(&mut self) -> Option<Item> {
