@@ -338,6 +338,10 @@ impl Graph {
 }
 
 /// Expressions that are still to be visited, the largest first, each once. What is added is smaller than what was taken last.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "it stands on the stack, and a box would be an allocation for each of many small searches"
+)]
 enum Left {
     /// Marks of the first expressions of a graph, of which most models have no more, and the last word that may have one.
     Marks([u64; Left::WORDS], usize),
