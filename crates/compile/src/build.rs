@@ -4,8 +4,9 @@
 //! globals, appearance ─▶ items ─▶ kinds ─▶ contexts ─▶ analysis ─▶ Model ─▶ checks
 //! ```
 
-use std::collections::HashMap;
 use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
 
 use crate::analysis::{Analysed, analyse};
 use crate::chance::Clocks;
@@ -88,8 +89,8 @@ struct Looks {
 
 /// The first place of each kind of module in strings and in drawings, and the tissues and gases that strings name.
 struct Places {
-    occurs: HashMap<KindId, Span>,
-    drawn: HashMap<KindId, Span>,
+    occurs: FxHashMap<KindId, Span>,
+    drawn: FxHashMap<KindId, Span>,
     materials: Vec<MaterialNumber>,
 }
 

@@ -1,9 +1,10 @@
 //! Random elements of a model: draws, weights of successors, and the clocks of events at a rate.
 
 use std::borrow::Cow;
-use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
 
 use crate::conditions::Atoms;
 use crate::rules::RuleBuilder;
@@ -106,8 +107,8 @@ impl Scope {
         &mut self,
         draws: Range<u32>,
         arguments: &dyn Fn(u32) -> Option<NodeId>,
-    ) -> Option<HashMap<u32, NodeId>> {
-        let mut images = HashMap::new();
+    ) -> Option<FxHashMap<u32, NodeId>> {
+        let mut images = FxHashMap::default();
         for number in draws {
             let DraftDraw { distribution, parameters, span } = self.draws.all[number as usize].clone();
             let parameters = self.graph.rewrite(&parameters, |_, _, node| match node {
@@ -133,13 +134,13 @@ impl Drawn {
     /// Compiles the arguments of a successor and its draws; `count` is the number of the rule's variables.
     pub fn compile(&self, scope: &mut Scope, roots: Vec<NodeId>, count: usize) -> (Program, Vec<Draw>) {
         if self.modules.is_empty() {
-            return (Program::compile(&scope.graph, &roots, count), Vec::new());
+            return (scope.graph.program(&roots, count), Vec::new());
         }
         let order: Vec<(usize, u32, u32)> = (self.modules.iter())
             .flat_map(|(place, draws)| draws.clone().enumerate().map(|(i, d)| (*place, i as u32, d)))
             .collect();
         let sure = unconditional(&scope.graph, &scope.draws.all, &roots);
-        let index: HashMap<u32, u32> = order.iter().zip(0..).map(|((.., draw), i)| (*draw, i)).collect();
+        let index: FxHashMap<u32, u32> = order.iter().zip(0..).map(|((.., draw), i)| (*draw, i)).collect();
         let place = |graph: &mut Graph, node| match node {
             Node::Var(v) if v >= DRAW => Some(graph.var(count as u32 + index[&(v - DRAW)])),
             _ => None,
@@ -186,9 +187,9 @@ fn unconditional(graph: &Graph, draws: &[DraftDraw], roots: &[NodeId]) -> Vec<u3
 #[derive(Default)]
 pub struct Clocks {
     /// The keys of the clauses with a rate, by name and number of parameters of the predecessor.
-    keys: HashMap<(Arc<str>, usize), Vec<u64>>,
+    keys: FxHashMap<(Arc<str>, usize), Vec<u64>>,
     /// The maximum number of clocks over the kinds that one context pattern may match.
-    widths: HashMap<(String, usize), usize>,
+    widths: FxHashMap<(String, usize), usize>,
 }
 
 /// The name under which clocks are collected: `+`, `-` and `±` share their rules, and so do `+_l`, `-_l` and `±_l`.

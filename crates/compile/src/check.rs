@@ -1,6 +1,6 @@
 //! Checks of a compiled model: errors and warnings that need no simulation.
 
-use std::collections::{HashMap, HashSet};
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::advice;
 use crate::appearance::surface_hint;
@@ -25,7 +25,7 @@ const MAX_INERT: usize = 20;
 pub fn reachability(
     model: &Model,
     rules: &[&ast::Rule],
-    occurs: &HashMap<KindId, Span>,
+    occurs: &FxHashMap<KindId, Span>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let mut kinds_of: Vec<Vec<KindId>> = vec![Vec::new(); model.rules.len()];
@@ -52,7 +52,7 @@ pub fn reachability(
         }
     }
     // The kinds that can develop from the axiom.
-    let mut alive: HashSet<KindId> = model.axiom.kinds().collect();
+    let mut alive: FxHashSet<KindId> = model.axiom.kinds().collect();
     let mut queue: Vec<KindId> = model.axiom.kinds().collect();
     while let Some(kind) = queue.pop() {
         for rule in model.kinds.get(kind).all_rules() {
@@ -175,7 +175,7 @@ fn always_false(rule: &Rule) -> String {
 
 /// The error for a rule whose module occurs in no string. None if another check reports it: misspelt words and wrong
 /// numbers of parameters are reported at the module.
-fn never_made(model: &Model, rule: &ast::Rule, occurs: &HashMap<KindId, Span>) -> Option<Diagnostic> {
+fn never_made(model: &Model, rule: &ast::Rule, occurs: &FxHashMap<KindId, Span>) -> Option<Diagnostic> {
     let head = &rule.predecessor;
     let name = &*head.name.text;
     let error = Diagnostic::error("this rule can never be reached")
@@ -226,17 +226,17 @@ pub fn period(declared: Option<(f64, Span)>, model: &Model, diagnostics: &mut Ve
 /// Warns of modules without any effect: no rule, no drawing, no context. Of those in the drawings of others only surfaces count here.
 pub fn inert_modules(
     model: &Model,
-    occurs: &HashMap<KindId, Span>,
-    drawn: &HashMap<KindId, Span>,
+    occurs: &FxHashMap<KindId, Span>,
+    drawn: &FxHashMap<KindId, Span>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
-    let in_context: HashSet<KindId> = model
+    let in_context: FxHashSet<KindId> = model
         .rules
         .iter()
         .flat_map(|r| r.left.iter().chain(&r.right).chain(r.aggregates.iter().map(|a| &a.pattern)))
         .flat_map(|p| p.kinds.iter().copied())
         .collect();
-    let with_rules: HashSet<&str> = model
+    let with_rules: FxHashSet<&str> = model
         .kinds
         .iter()
         .filter(|(_, k)| !k.has_no_rules() || k.interpretation.is_some())
@@ -246,7 +246,7 @@ pub fn inert_modules(
     let mut all: Vec<(Span, KindId)> =
         occurs.iter().chain(surfaces).map(|(kind, span)| (*span, *kind)).collect();
     all.sort_unstable();
-    let mut said = HashSet::new();
+    let mut said = FxHashSet::default();
     for (span, id) in all {
         let kind = model.kinds.get(id);
         let name = kind.name.as_str();
@@ -284,7 +284,7 @@ pub fn inert_modules(
                     ),
             ),
             Class::Word => {
-                let names: HashSet<&str> = with_rules.iter().copied().chain(DRAWN_WORDS).collect();
+                let names: FxHashSet<&str> = with_rules.iter().copied().chain(DRAWN_WORDS).collect();
                 if let Some(parts) = split(name, &names) {
                     diagnostics.push(
                         Diagnostic::error(format!("unknown module `{name}`"))
@@ -319,7 +319,7 @@ pub fn inert_modules(
 }
 
 /// Reports turtle commands with too few parameters.
-pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashMap<KindId, Span>) {
+pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &FxHashMap<KindId, Span>) {
     for (id, kind) in model.kinds.iter() {
         let mut commands = COMMAND_SURFACES.into_iter().chain([(ELASTIC, 1), (SOURCE, 2)]);
         let Some((name, needed)) = commands.find(|(name, _)| *name == kind.base()) else {
@@ -353,7 +353,7 @@ pub fn commands(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashM
 }
 
 /// Reports surfaces with more parameters than sizes.
-pub fn surface_sizes(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &HashMap<KindId, Span>) {
+pub fn surface_sizes(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &FxHashMap<KindId, Span>) {
     for (id, kind) in model.kinds.iter() {
         let name = kind.name.as_str();
         let declared = model.appearance.surfaces.iter().any(|shape| shape.name == name);
@@ -381,7 +381,7 @@ pub fn surface_sizes(model: &Model, diagnostics: &mut Vec<Diagnostic>, places: &
 }
 
 /// Splits a word into two or more known names.
-fn split<'n>(word: &'n str, names: &HashSet<&str>) -> Option<Vec<&'n str>> {
+fn split<'n>(word: &'n str, names: &FxHashSet<&str>) -> Option<Vec<&'n str>> {
     if word.len() > 60 || base_of(word) != word {
         return None;
     }

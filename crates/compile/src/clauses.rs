@@ -1,10 +1,9 @@
 //! The clauses of a rule, lowered to the graph: conditions, productions and equations.
 
 use std::borrow::Cow;
-use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::analysis::never_reached;
 use crate::chance::{Hazard, production_keys};
@@ -64,7 +63,7 @@ struct Smooth {
 
 /// Parameters by name of the module, without its index, and the number of its parameters: those that some rule moves; None if it may move
 /// all of them.
-pub type MovingParameters = HashMap<(Arc<str>, usize), Option<HashSet<usize>>>;
+pub type MovingParameters = FxHashMap<(Arc<str>, usize), Option<FxHashSet<usize>>>;
 
 /// The parameters that the rules of a document move.
 pub fn moving_parameters(document: &Document) -> MovingParameters {
@@ -79,7 +78,8 @@ pub fn moving_parameters(document: &Document) -> MovingParameters {
         // One rule may stand for both turns.
         let names: &[&str] = if &*name.text == "±" { &["+", "-"] } else { &[base_of(&name.text)] };
         for &name in names {
-            let known = all.entry((name.into(), parameters.len())).or_insert_with(|| Some(HashSet::new()));
+            let known =
+                all.entry((name.into(), parameters.len())).or_insert_with(|| Some(FxHashSet::default()));
             match (known.as_mut(), &moving) {
                 (Some(known), Some(moving)) => known.extend(moving),
                 _ => *known = None,
@@ -91,7 +91,7 @@ pub fn moving_parameters(document: &Document) -> MovingParameters {
 
 /// The parameters of a module that some clause of its rule gives an equation or a value; None if some equation does not say for what it is
 /// solved.
-fn moving(rule: &ast::Rule) -> Option<HashSet<usize>> {
+fn moving(rule: &ast::Rule) -> Option<FxHashSet<usize>> {
     let equations = rule.clauses.iter().filter_map(|clause| match &clause.action {
         Action::Solve(equations) => Some(equations),
         _ => None,

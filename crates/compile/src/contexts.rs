@@ -1,8 +1,6 @@
 //! Resolution of the names in contexts, aggregates, `ignore` and `consider` to kinds of modules.
 
-use std::collections::HashSet;
-
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::advice;
 use crate::declared::{DeclaredPattern, DeclaredRule, ResolvedRule};
@@ -99,6 +97,9 @@ fn resolve(
 
 /// The kinds that `solid` or `shelf` names.
 pub fn bodies(kinds: &Kinds, names: &[&ast::Name], diagnostics: &mut Vec<Diagnostic>) -> Vec<(KindId, Span)> {
+    if names.is_empty() {
+        return Vec::new();
+    }
     let index = ByName::new(kinds);
     let mut solids: Vec<(KindId, Span)> = Vec::new();
     for name in names {
@@ -138,7 +139,7 @@ pub fn filter(
         found
     };
     if !considered.is_empty() {
-        let chosen: HashSet<KindId> =
+        let chosen: FxHashSet<KindId> =
             considered.iter().flat_map(|name| find(kinds, name, diagnostics)).collect();
         let all: Vec<KindId> = kinds.iter().map(|(id, _)| id).collect();
         for id in all {

@@ -1,6 +1,6 @@
 //! Domains that a module can leave without a production.
 
-use std::collections::HashSet;
+use rustc_hash::FxHashSet;
 
 use dlsys_diagnostic::Diagnostic;
 use dlsys_model::{Comparison, Condition, Model, Remedy, Rule, Sign, Solve, Truth, ZeroCrossing};
@@ -12,7 +12,7 @@ pub fn coverage(model: &Model, diagnostics: &mut Vec<Diagnostic>) {
             continue;
         }
         for (i, solve) in rule.solves.iter().enumerate() {
-            let (mut said, mut gaps) = (HashSet::new(), HashSet::new());
+            let (mut said, mut gaps) = (FxHashSet::default(), FxHashSet::default());
             for (atom, comparison) in solve.guard.atoms() {
                 let others = rule.solves.iter().enumerate().filter(|(j, s)| *j != i && !s.guard.is_always());
                 let covered = rule.produces.iter().any(|p| p.guard.atoms().any(|(a, _)| a == atom))

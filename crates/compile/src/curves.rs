@@ -3,8 +3,9 @@
 //! `slope`, `integral`, `inverse` and `length` take the name of a curve, a function or an array as their first argument.
 //! These names are not reserved: a function that the model declares takes precedence.
 
-use std::collections::HashSet;
 use std::sync::Arc;
+
+use rustc_hash::FxHashSet;
 
 use crate::functions;
 use crate::scope::{FORMAL, Lowered, Scope, plural};
@@ -210,7 +211,7 @@ impl Scope {
     }
 
     /// The nodes of an expression that are first arguments of `slope` and its like: names and not values.
-    pub(super) fn functional_names(&self, all: &Expressions, expression: Expression) -> HashSet<ExprId> {
+    pub(super) fn functional_names(&self, all: &Expressions, expression: Expression) -> FxHashSet<ExprId> {
         (expression.first.0..=expression.root.0)
             .filter_map(|id| match all.get(ExprId(id)) {
                 Expr::Call(name, arguments) if self.is_functional(name) => arguments.first().copied(),

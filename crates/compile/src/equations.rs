@@ -8,7 +8,7 @@
 //! evaluation of its own. Each implicit equation is matched to the parameter that it is solved for. Without a complete
 //! matching the equations are singular for all values, which is an error here.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use crate::advice;
 use crate::analysis::is_singular;
@@ -67,7 +67,7 @@ impl RuleBuilder<'_> {
     ) -> Option<Equations> {
         let mut rates: Vec<(usize, NodeId)> = Vec::new();
         let (mut values, mut zeros): (Vec<DeclaredAlgebraic>, Vec<Zero>) = Default::default();
-        let mut seen: HashMap<usize, Span> = HashMap::new();
+        let mut seen: FxHashMap<usize, Span> = FxHashMap::default();
         let mut good = true;
         for equation in equations {
             let name = match equation {
@@ -171,7 +171,7 @@ impl RuleBuilder<'_> {
         }
         let graph = &mut self.scope.graph;
         let reads: Vec<Vec<u32>> = values.iter().map(|v| graph.variables(&[v.node])).collect();
-        let mut known: HashMap<u32, NodeId> = HashMap::new();
+        let mut known: FxHashMap<u32, NodeId> = FxHashMap::default();
         let mut left: Vec<usize> = (0..values.len()).collect();
         while !left.is_empty() {
             let waits = |i: usize| {
@@ -230,7 +230,7 @@ impl RuleBuilder<'_> {
             .collect();
         let unknowns = self.unknowns(&zeros, &reads, named, head)?;
         // By unknown: the equation that is solved for it.
-        let mut equation_of: HashMap<usize, usize> =
+        let mut equation_of: FxHashMap<usize, usize> =
             (zeros.iter().enumerate()).filter_map(|(i, zero)| Some((zero.unknown?, i))).collect();
         let fixed: Vec<bool> = zeros.iter().map(|zero| zero.unknown.is_some()).collect();
         for (i, zero) in zeros.iter().enumerate().filter(|(i, _)| !fixed[*i]) {
@@ -315,7 +315,7 @@ impl RuleBuilder<'_> {
     }
 }
 
-fn substitute(graph: &mut Graph, root: NodeId, known: &HashMap<u32, NodeId>) -> NodeId {
+fn substitute(graph: &mut Graph, root: NodeId, known: &FxHashMap<u32, NodeId>) -> NodeId {
     graph.rewrite(&[root], |_, _, node| match node {
         Node::Var(v) => known.get(&v).copied(),
         _ => None,
@@ -329,7 +329,7 @@ fn augment(
     reads: &[Vec<usize>],
     unknowns: &[usize],
     fixed: &[bool],
-    equation_of: &mut HashMap<usize, usize>,
+    equation_of: &mut FxHashMap<usize, usize>,
     visited: &mut Vec<usize>,
 ) -> bool {
     for unknown in reads[equation].iter().filter(|p| unknowns.contains(p)) {

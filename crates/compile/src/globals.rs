@@ -1,7 +1,8 @@
 //! Constants, `param`s, functions, and the numbers of colours, tissues and gases, in the order of their dependencies.
 
-use std::collections::HashMap;
 use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
 
 use crate::Setting;
 use crate::advice;
@@ -38,7 +39,7 @@ pub fn declare(
     files: &dyn Files,
 ) -> Vec<Parameter> {
     let globals = collect(document, scope);
-    let index: HashMap<&str, usize> = globals.iter().enumerate().map(|(i, g)| (&*g.name.text, i)).collect();
+    let index: FxHashMap<&str, usize> = globals.iter().enumerate().map(|(i, g)| (&*g.name.text, i)).collect();
     for name in &document.unread {
         if !index.contains_key(&**name) && !Scope::is_built_in(name) {
             scope.poison(name.clone());
@@ -93,7 +94,7 @@ pub fn declare(
 
 fn collect<'d>(document: &'d Document, scope: &mut Scope) -> Vec<Global<'d>> {
     let mut globals: Vec<Global> = Vec::new();
-    let mut first: HashMap<&str, Span> = HashMap::new();
+    let mut first: FxHashMap<&str, Span> = FxHashMap::default();
     let mut next_color = BUILT_IN_COLORS + 1;
     let mut next_gradient = first_gradient(document);
     let mut next_contour = 1;
@@ -227,7 +228,7 @@ pub(super) fn mentions(
 fn dependencies(
     document: &Document,
     globals: &[Global],
-    index: &HashMap<&str, usize>,
+    index: &FxHashMap<&str, usize>,
 ) -> Vec<Vec<(usize, Span)>> {
     globals
         .iter()
@@ -256,7 +257,7 @@ fn dependencies(
 fn order(
     document: &Document,
     globals: &[Global],
-    index: &HashMap<&str, usize>,
+    index: &FxHashMap<&str, usize>,
     scope: &mut Scope,
 ) -> Vec<usize> {
     #[derive(Clone, Copy, PartialEq)]

@@ -5,7 +5,9 @@
 //! on until the surroundings give the next one. The value is a parameter with the slope as its rate, so that closed forms, event
 //! location and step control treat it as any other. A name of the model hides that of a quantity.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet};
+
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::chance::{group, sort};
 use crate::rules::RuleBuilder;
@@ -32,11 +34,11 @@ type Head = (String, usize);
 /// The kinds whose rules read what the surroundings give.
 #[derive(Default)]
 pub struct Inputs {
-    readers: HashMap<Head, BTreeSet<Quantity>>,
+    readers: FxHashMap<Head, BTreeSet<Quantity>>,
     /// The same for all kinds that one context pattern may match.
-    groups: HashMap<Head, BTreeSet<Quantity>>,
+    groups: FxHashMap<Head, BTreeSet<Quantity>>,
     /// The rules that read a quantity, each by its first expression.
-    rules: HashSet<(ExprId, Quantity)>,
+    rules: FxHashSet<(ExprId, Quantity)>,
     /// The first place in the rules of a kind that reads a quantity, in the order of the text.
     places: Vec<(Head, Quantity, Span)>,
     /// The model declares a sheet, with or without a mistake.
@@ -252,7 +254,7 @@ pub(super) fn check(model: &Model, inputs: &Inputs, diagnostics: &mut Vec<Diagno
         );
         return;
     }
-    let mut told: HashSet<&Head> = HashSet::new();
+    let mut told: FxHashSet<&Head> = FxHashSet::default();
     for (head, quantity, span) in inputs.places.iter().filter(|(_, quantity, _)| quantity.is_force()) {
         let (kind, arity) = head;
         let is_solid = model

@@ -1,6 +1,6 @@
 //! `let`: names for parts of a rule.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use crate::rules::RuleBuilder;
 use crate::scope::{RESERVED, Scope, Variables};
@@ -11,7 +11,7 @@ impl RuleBuilder<'_> {
     /// Declares the names of `let` lines, each for those after it; false if one has an error.
     pub(super) fn locals(&mut self, rule: &ast::Rule, variables: &mut Variables) -> bool {
         let mut good = true;
-        let mut seen: HashMap<&str, Span> = HashMap::new();
+        let mut seen: FxHashMap<&str, Span> = FxHashMap::default();
         variables.lets = rule.locals.iter().map(|(name, _)| (name.text.clone(), name.span)).collect();
         for (name, value) in &rule.locals {
             let text = &name.text;

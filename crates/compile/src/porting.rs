@@ -1,6 +1,6 @@
 //! Warnings for texts that mean something else in cpfg or L-Py, and for what has no effect here without being an error.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use crate::clauses::names_of;
 use dlsys_diagnostic::{Diagnostic, Span};
@@ -147,7 +147,7 @@ fn of_both_turns(module: &ast::Module, rule: &ast::Rule) -> Diagnostic {
 }
 
 /// Warns of words in drawings that mean nothing there. `drawn` are the modules of drawings.
-pub fn drawn_words(model: &Model, drawn: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
+pub fn drawn_words(model: &Model, drawn: &FxHashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
     let mut all: Vec<(Span, KindId)> = drawn.iter().map(|(kind, span)| (*span, *kind)).collect();
     all.sort_unstable();
     let interpreted = || model.kinds.iter().filter(|(_, k)| k.interpretation.is_some()).map(|(_, k)| k);

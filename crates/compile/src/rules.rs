@@ -1,6 +1,5 @@
 //! Lowering of strings, heads and interpretations, the parts of a model that consist of modules.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
@@ -37,9 +36,9 @@ pub struct RuleBuilder<'b> {
     /// Number of brackets that are open around the part of a string that is being lowered.
     pub(super) open_around: usize,
     /// Each kind that occurs in a string, with its first place.
-    pub occurs: HashMap<KindId, Span>,
+    pub occurs: FxHashMap<KindId, Span>,
     /// Each kind that occurs in the drawing of another kind, with its first place.
-    pub drawn: HashMap<KindId, Span>,
+    pub drawn: FxHashMap<KindId, Span>,
     /// The constant arguments of `@E`, in strings and drawings.
     pub materials: Vec<MaterialNumber>,
 }

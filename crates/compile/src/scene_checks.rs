@@ -1,6 +1,6 @@
 //! Checks of the modules of a scene: `@G` needs a ground, `@E(NAME)` a tissue, `@S(NAME, …)` a gas, `@D` has no parameters, and what is solid is drawn.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 
 use dlsys_diagnostic::{Diagnostic, Severity, Span};
 use dlsys_model::{DETACH, ELASTIC, GROUND, Kind, KindId, Model, SOURCE, Soil, Units};
@@ -26,7 +26,7 @@ pub fn is_hidden(model: &Model, kind: &Kind) -> bool {
 }
 
 /// Reports `@G` in a model without a ground.
-pub fn ground(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
+pub fn ground(model: &Model, places: &FxHashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
     if model.scenery.ground.is_some() || model.scenery.bed.is_some() {
         return;
     }
@@ -43,7 +43,7 @@ pub fn ground(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut V
 }
 
 /// Reports `@D` with parameters.
-pub fn detach(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
+pub fn detach(model: &Model, places: &FxHashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
     let is_wrong = |kind: &Kind| kind.base() == DETACH && kind.arity > 0 && !is_hidden(model, kind);
     for (id, kind) in model.kinds.iter().filter(|(_, kind)| is_wrong(kind)) {
         if let Some(span) = places.get(&id) {
@@ -64,8 +64,8 @@ pub fn detach(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut V
 /// Reports names behind `solid` and `shelf` that are no modules of a string: a body is all that a module of the string draws.
 pub fn solids(
     model: &Model,
-    occurs: &HashMap<KindId, Span>,
-    drawn: &HashMap<KindId, Span>,
+    occurs: &FxHashMap<KindId, Span>,
+    drawn: &FxHashMap<KindId, Span>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     for (kind, span) in model.scenery.solids.iter().chain(&model.scenery.shelves) {
@@ -85,7 +85,7 @@ pub fn solids(
 /// Reports `@E(…)` in a model without a tissue, and arguments that are the number of none.
 pub fn tissues(
     model: &Model,
-    places: &HashMap<KindId, Span>,
+    places: &FxHashMap<KindId, Span>,
     numbers: &[MaterialNumber],
     diagnostics: &mut Vec<Diagnostic>,
 ) {
@@ -129,7 +129,7 @@ pub fn tissues(
 /// Reports `@S(…)` in a model without a gas, and arguments that are the number of none.
 pub fn gases(
     model: &Model,
-    places: &HashMap<KindId, Span>,
+    places: &FxHashMap<KindId, Span>,
     numbers: &[MaterialNumber],
     diagnostics: &mut Vec<Diagnostic>,
 ) {

@@ -1,10 +1,9 @@
 //! Constants, parameters and functions of a model, and the lowering of expressions to the graph.
 
-use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::Arc;
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::advice;
 use crate::air::{self, Air};
@@ -55,7 +54,7 @@ pub struct Variables {
     /// Help for `t` or `age` in an expression without them; None if they are in `names`.
     pub no_time: Option<&'static str>,
     /// Names and places of all `let` lines of the rule, including those not yet lowered.
-    pub lets: HashMap<Arc<str>, Span>,
+    pub lets: FxHashMap<Arc<str>, Span>,
     /// In a rule: the variable of its first aggregate, and the number of all its variables.
     pub aggregates: Option<(u32, u32)>,
 }
@@ -73,16 +72,16 @@ pub struct Gathered {
 pub struct Scope {
     pub graph: Graph,
     /// Values; None if the declaration has errors, which have been reported.
-    pub(super) constants: HashMap<Arc<str>, Option<f64>>,
-    pub(super) functions: HashMap<Arc<str>, Function>,
+    pub(super) constants: FxHashMap<Arc<str>, Option<f64>>,
+    pub(super) functions: FxHashMap<Arc<str>, Function>,
     /// None if the declaration has errors, as for constants.
-    pub(super) curves: HashMap<Arc<str>, Option<Lookup>>,
-    pub(super) arrays: HashMap<Arc<str>, Option<Lookup>>,
+    pub(super) curves: FxHashMap<Arc<str>, Option<Lookup>>,
+    pub(super) arrays: FxHashMap<Arc<str>, Option<Lookup>>,
     /// Global names that some expression has used.
-    pub used: HashSet<Arc<str>>,
-    pub(super) poisoned: HashSet<Arc<str>>,
+    pub used: FxHashSet<Arc<str>>,
+    pub(super) poisoned: FxHashSet<Arc<str>>,
     /// Unknown names that have been reported.
-    pub(super) unknown: HashSet<Arc<str>>,
+    pub(super) unknown: FxHashSet<Arc<str>>,
     /// Place and text of the comparisons of the current rule, by node. Rules number their variables alike, so that the nodes
     /// of one rule are not valid in another.
     pub comparisons: NodeMap<(Span, Arc<Sides>)>,
@@ -92,7 +91,7 @@ pub struct Scope {
     pub(super) function_comparisons: NodeMap<(Span, Arc<Sides>)>,
     pub diagnostics: Vec<Diagnostic>,
     /// Names that only comments define, with their values.
-    pub(super) commented: HashMap<Arc<str>, String>,
+    pub(super) commented: FxHashMap<Arc<str>, String>,
     pub draws: Draws,
     /// The wind, if the model declares one.
     pub air: Option<Air>,

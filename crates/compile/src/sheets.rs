@@ -1,7 +1,8 @@
 //! Sheets: flexible surfaces and nets, from the syntax tree to the model.
 
-use std::collections::HashMap;
 use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
 
 use crate::advice;
 use crate::physics::MAX_DECLARED;
@@ -234,7 +235,7 @@ pub fn unused(scenery: &Scenery, is_used: impl Fn(&str) -> bool, scope: &mut Sco
 }
 
 /// Reports sheets with parameters, and warns of sheets in plants of other models.
-pub fn modules(model: &Model, places: &HashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
+pub fn modules(model: &Model, places: &FxHashMap<KindId, Span>, diagnostics: &mut Vec<Diagnostic>) {
     let is_sheet = |name: &str| model.scenery.sheets.iter().any(|sheet| sheet.name == name);
     for (id, kind) in model.kinds.iter() {
         if kind.arity == 0 || kind.interpretation.is_some() || !is_sheet(&kind.name) {

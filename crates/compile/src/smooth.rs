@@ -3,8 +3,9 @@
 //! An equation is smooth between the instants at which its conditions change, so that an integrator keeps its order there.
 //! Each condition becomes a variable, and its change an event (see [`Switch`]).
 
-use std::collections::HashMap;
 use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
 
 use crate::analysis::{driven_form, outside_of_drivers};
 use crate::conditions::{Atoms, Sides};
@@ -19,7 +20,7 @@ type Written = (Vec<(usize, NodeId)>, usize, usize);
 /// Equations without conditions that have been made smooth before, and what became of them: rules that differ in names only have the
 /// same expressions.
 #[derive(Default)]
-pub struct Smoothed(HashMap<Written, Vec<(usize, NodeId)>>);
+pub struct Smoothed(FxHashMap<Written, Vec<(usize, NodeId)>>);
 
 impl RuleBuilder<'_> {
     /// As [`smooth`](RuleBuilder::smooth), once for equations without conditions that many rules have.

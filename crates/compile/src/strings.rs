@@ -1,7 +1,7 @@
 //! Strings of modules: successors with their weights, axioms and drawings; checks of the numbers of parameters of their
 //! modules.
 
-use std::collections::{HashMap, HashSet};
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::advice;
 use crate::chance::Drawn;
@@ -70,8 +70,8 @@ impl RuleBuilder<'_> {
             );
             return None;
         }
-        let program = Program::compile(&self.scope.graph, &weights, count);
-        Some(Outcome { weights: (!weights.is_empty()).then_some(program), successors })
+        let weights = (!weights.is_empty()).then(|| self.scope.graph.program(&weights, count));
+        Some(Outcome { weights, successors })
     }
 
     /// Lowers a string of modules over the given variables, with draws or without.
@@ -349,11 +349,11 @@ impl RuleBuilder<'_> {
     /// Reports words in strings (or drawings) whose number of parameters differs from that of their rules (or drawings).
     /// `place` describes the head with the right number.
     pub fn check_arities(&mut self, heads: &[&HeadModule], strings: &[&[ast::Part]], place: &str) {
-        let mut declared: HashMap<&str, Vec<&HeadModule>> = HashMap::new();
+        let mut declared: FxHashMap<&str, Vec<&HeadModule>> = FxHashMap::default();
         for &head in heads {
             declared.entry(&head.name.text).or_default().push(head);
         }
-        let mut reported: HashSet<(&str, usize)> = HashSet::new();
+        let mut reported: FxHashSet<(&str, usize)> = FxHashSet::default();
         for module in strings.iter().flat_map(|parts| modules_of(parts)) {
             // The turtle has defaults for missing parameters of symbols and surfaces.
             if class_of(&module.name) != Class::Word {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::{Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Part, Unary, Value};
+use super::{Array, Binary, Curve, FIELD_ARGUMENTS, FieldPart, FieldSlot, Part, Program, Unary, Value};
 
 /// An expression in a [`Graph`]. Two expressions of the same graph that are built alike are equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -60,6 +60,8 @@ pub struct Graph {
     fields: Vec<FieldSlot>,
     /// Expressions whose antiderivative by another one is known.
     integrals: NodeMap<Integral>,
+    /// Programs so far, by the number of their variables and by their roots.
+    programs: FxHashMap<usize, FxHashMap<Box<[NodeId]>, Program>>,
 }
 
 /// An antiderivative of an expression: the expression is the derivative of `whole` by `argument`.
@@ -90,6 +92,17 @@ impl Graph {
         self.nodes.push(node);
         self.ids.insert(node, id);
         id
+    }
+
+    /// The program of these roots ([`Program::compile`]), compiled once for all who ask for it: rules that differ in names only have the
+    /// same expressions.
+    pub fn program(&mut self, roots: &[NodeId], variables: usize) -> Program {
+        if let Some(known) = self.programs.get(&variables).and_then(|known| known.get(roots)) {
+            return known.clone();
+        }
+        let program = Program::compile(self, roots, variables);
+        self.programs.entry(variables).or_default().insert(roots.into(), program.clone());
+        program
     }
 
     /// Adds a curve.
@@ -304,13 +317,10 @@ impl Graph {
 
     /// The same, operands last: operands have smaller ids, so the largest that is left has no users left.
     fn descending(&self, roots: &[NodeId]) -> impl Iterator<Item = NodeId> {
-        let mut left: BinaryHeap<NodeId> = roots.iter().copied().collect();
+        let mut left = Left::from(roots);
         std::iter::from_fn(move || {
             let id = left.pop()?;
-            while left.peek() == Some(&id) {
-                left.pop();
-            }
-            left.extend(self.node(id).operands().into_iter().flatten());
+            self.node(id).operands().into_iter().flatten().for_each(|operand| left.add(operand));
             Some(id)
         })
     }
@@ -324,6 +334,58 @@ impl Graph {
         let mut all: Vec<u32> = self.descending(roots).filter_map(variable).collect();
         all.sort_unstable();
         all
+    }
+}
+
+/// Expressions that are still to be visited, the largest first, each once. What is added is smaller than what was taken last.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "it stands on the stack, and a box would be an allocation for each of many small searches"
+)]
+enum Left {
+    /// Marks of the first expressions of a graph, of which most models have no more, and the last word that may have one.
+    Marks([u64; Left::WORDS], usize),
+    Heap(BinaryHeap<NodeId>),
+}
+
+impl Left {
+    const WORDS: usize = 64;
+
+    fn from(roots: &[NodeId]) -> Left {
+        let last = roots.iter().max().map_or(0, |last| last.index() / 64);
+        if last >= Left::WORDS {
+            return Left::Heap(roots.iter().copied().collect());
+        }
+        let mut left = Left::Marks([0; Left::WORDS], last);
+        roots.iter().for_each(|root| left.add(*root));
+        left
+    }
+
+    fn add(&mut self, id: NodeId) {
+        match self {
+            Left::Marks(words, _) => words[id.index() / 64] |= 1 << (id.index() % 64),
+            Left::Heap(heap) => heap.push(id),
+        }
+    }
+
+    fn pop(&mut self) -> Option<NodeId> {
+        match self {
+            Left::Marks(words, last) => {
+                while words[*last] == 0 {
+                    *last = last.checked_sub(1)?;
+                }
+                let bit = words[*last].ilog2();
+                words[*last] &= !(1 << bit);
+                Some(NodeId(*last as u32 * 64 + bit))
+            }
+            Left::Heap(heap) => {
+                let id = heap.pop()?;
+                while heap.peek() == Some(&id) {
+                    heap.pop();
+                }
+                Some(id)
+            }
+        }
     }
 }
 
@@ -343,6 +405,38 @@ impl Node {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Small and large expressions are passed through by different means: each reaches what it is built from, once, operands first.
+    #[test]
+    fn what_an_expression_is_built_from_is_found_in_small_and_large_graphs() {
+        let mut graph = Graph::default();
+        let mut roots = vec![graph.var(3), graph.var(1)];
+        for i in 0..6000 {
+            let factor = graph.constant(f64::from(i % 7));
+            let [a, b] = [roots[roots.len() - 1], roots[roots.len() * 3 / 4]];
+            let product = graph.binary(Binary::Mul, factor, b);
+            roots.push(graph.binary(Binary::Add, a, product));
+        }
+        for root in [roots[0], roots[1], roots[2], roots[100], roots[1000], roots[roots.len() - 1]] {
+            let mut expected = NodeSet::from_iter([root]);
+            let mut stack = vec![root];
+            while let Some(id) = stack.pop() {
+                let operands = graph.node(id).operands().into_iter().flatten();
+                stack.extend(operands.filter(|operand| expected.insert(*operand)));
+            }
+            let mut expected: Vec<NodeId> = expected.into_iter().collect();
+            expected.sort_unstable();
+            assert_eq!(graph.reachable(&[root, root]), expected);
+            let variable = |id: &NodeId| match graph.node(*id) {
+                Node::Var(v) => Some(v),
+                _ => None,
+            };
+            let mut variables: Vec<u32> = expected.iter().filter_map(variable).collect();
+            variables.sort_unstable();
+            assert_eq!(graph.variables(&[root]), variables);
+        }
+        assert!(graph.nodes().len() > Left::WORDS * 64 && graph.reachable(&[]).is_empty());
+    }
 
     #[test]
     fn equal_expressions_are_one_node() {

@@ -97,9 +97,12 @@ fn joined(product: Instruction, sum: Instruction) -> Option<Instruction> {
 /// Registers of an evaluation, kept from one to the next so that nothing is allocated.
 pub type Scratch<T> = Vec<T>;
 
-/// Code that computes a few expressions of one [`Graph`] from its variables.
+/// Code that computes a few expressions of one [`Graph`] from its variables. Copies share it.
 #[derive(Clone, Debug, Default)]
-pub struct Program {
+pub struct Program(Arc<Code>);
+
+#[derive(Debug, Default)]
+struct Code {
     code: Vec<Instruction>,
     outputs: Vec<Register>,
     variables: usize,
@@ -112,7 +115,7 @@ pub struct Program {
     arrays: Vec<Arc<Array>>,
     fields: Vec<FieldSlot>,
     /// The code for plain numbers.
-    plain: Option<Box<Plain>>,
+    plain: Option<Plain>,
 }
 
 /// The curves, arrays or fields that a program reads, each once.
@@ -287,41 +290,43 @@ impl Program {
         reads.dedup();
         let Compiler { curves, arrays, fields, registers, .. } = compiler;
         let (curves, arrays, fields, registers) = (curves.all, arrays.all, fields.all, registers as usize);
-        let plain = Plain::new(&code, registers).map(Box::new);
-        Program { constants, curves, arrays, fields, plain, code, outputs, variables, registers, reads }
+        let plain = Plain::new(&code, registers);
+        let parts =
+            Code { constants, curves, arrays, fields, plain, code, outputs, variables, registers, reads };
+        Program(Arc::new(parts))
     }
 
     /// The number of variables that the roots may read.
     pub fn variables(&self) -> usize {
-        self.variables
+        self.0.variables
     }
 
     /// Number of values that an evaluation gives.
     pub fn outputs(&self) -> usize {
-        self.outputs.len()
+        self.0.outputs.len()
     }
 
     /// The variables that it reads, ascending.
     pub fn reads(&self) -> &[usize] {
-        &self.reads
+        &self.0.reads
     }
 
     /// The least time within which a field that it reads changes much ([`Field::stretch`](crate::Field::stretch)); infinite if it reads none.
     pub fn stretch(&self) -> f64 {
-        let fields = self.fields.iter().filter_map(FieldSlot::get);
+        let fields = self.0.fields.iter().filter_map(FieldSlot::get);
         fields.map(|field| field.stretch()).fold(f64::INFINITY, f64::min)
     }
 
     /// The outputs, if they depend on nothing.
     pub fn constants(&self) -> Option<&[f64]> {
-        self.constants.as_deref()
+        self.0.constants.as_deref()
     }
 
     /// The value of one output, if it is a number that the code contains.
     pub fn constant_output(&self, output: usize) -> Option<f64> {
-        let register = *self.outputs.get(output)?;
+        let register = *self.0.outputs.get(output)?;
         // Registers are used again, but not that of an output.
-        self.code.iter().rev().find(|i| i.destination() == register).and_then(|i| match *i {
+        self.0.code.iter().rev().find(|i| i.destination() == register).and_then(|i| match *i {
             Instruction::Const(_, x) => Some(x),
             _ => None,
         })
@@ -329,20 +334,31 @@ impl Program {
 
     /// The variable that one output is, if it is no more than that.
     pub fn variable_output(&self, output: usize) -> Option<usize> {
-        let register = *self.outputs.get(output)? as usize;
-        (register < self.variables).then_some(register)
+        let register = *self.0.outputs.get(output)? as usize;
+        (register < self.0.variables).then_some(register)
     }
 
     /// The variables that one output depends on, ascending.
     pub fn output_reads(&self, output: usize) -> Vec<usize> {
-        let Some(&register) = self.outputs.get(output) else { return Vec::new() };
-        let mut wanted: BTreeSet<Register> = BTreeSet::from([register]);
-        for instruction in self.code.iter().rev() {
-            if wanted.remove(&instruction.destination()) {
-                wanted.extend(instruction.operands().into_iter().flatten());
+        let wanted = self.trace(output, |_| {});
+        (0..self.0.variables).filter(|variable| wanted[*variable]).collect()
+    }
+
+    /// Visits the instructions that an output is made by, from the last to the first. By register: true if the output depends on what is in it
+    /// before the first one.
+    fn trace(&self, output: usize, mut visit: impl FnMut(&Instruction)) -> Vec<bool> {
+        let mut wanted = vec![false; self.0.registers];
+        if let Some(&register) = self.0.outputs.get(output) {
+            wanted[register as usize] = true;
+        }
+        for instruction in self.0.code.iter().rev() {
+            if std::mem::take(&mut wanted[instruction.destination() as usize]) {
+                visit(instruction);
+                let operands = instruction.operands().into_iter().flatten();
+                operands.for_each(|operand| wanted[operand as usize] = true);
             }
         }
-        wanted.into_iter().map(|register| register as usize).filter(|r| *r < self.variables).collect()
+        wanted
     }
 
     /// The variables that decide over something that jumps: a whole part or a sign, a comparison, the element of an array or the piece
@@ -365,9 +381,9 @@ impl Program {
     /// The variables that some operands of the instructions depend on, ascending.
     fn reads_through(&self, operands: impl Fn(&Instruction) -> [Option<Register>; 2]) -> Vec<usize> {
         let mut all: BTreeSet<Register> = BTreeSet::new();
-        for (place, instruction) in self.code.iter().enumerate() {
+        for (place, instruction) in self.0.code.iter().enumerate() {
             let mut wanted: BTreeSet<Register> = operands(instruction).into_iter().flatten().collect();
-            for before in self.code[..place].iter().rev() {
+            for before in self.0.code[..place].iter().rev() {
                 if wanted.is_empty() {
                     break;
                 }
@@ -377,20 +393,16 @@ impl Program {
             }
             all.extend(wanted);
         }
-        all.into_iter().map(|register| register as usize).filter(|r| *r < self.variables).collect()
+        all.into_iter().map(|register| register as usize).filter(|r| *r < self.0.variables).collect()
     }
 
     /// True if one output is made of something that jumps.
     pub fn output_jumps(&self, output: usize) -> bool {
-        let Some(&register) = self.outputs.get(output) else { return false };
-        let mut wanted: BTreeSet<Register> = BTreeSet::from([register]);
-        self.code.iter().rev().any(|instruction| {
-            let is_part = wanted.remove(&instruction.destination());
-            if is_part {
-                wanted.extend(instruction.operands().into_iter().flatten());
-            }
-            is_part && self.jumps_over(instruction).iter().any(Option::is_some)
-        })
+        let mut jumps = false;
+        self.trace(output, |instruction| {
+            jumps |= self.jumps_over(instruction).iter().any(Option::is_some);
+        });
+        jumps
     }
 
     /// The operands over which an instruction jumps.
@@ -402,7 +414,7 @@ impl Program {
             Instruction::Left(op, .., a) | Instruction::Right(op, _, a, _) if compares(op) => [Some(a), None],
             Instruction::Select(_, c, ..) => [Some(c), None],
             Instruction::Element(.., a) | Instruction::Piece(.., a, _) => [Some(a), None],
-            Instruction::Curve(curve, part, _, a) if self.curves[curve as usize].jumps(part) => {
+            Instruction::Curve(curve, part, _, a) if self.0.curves[curve as usize].jumps(part) => {
                 [Some(a), None]
             }
             _ => [None; 2],
@@ -413,45 +425,46 @@ impl Program {
     ///
     /// `variables` gives the variables from 0 on; `out` takes as many values as there are roots.
     pub fn eval<T: Value>(&self, variables: &[T], scratch: &mut Scratch<T>, out: &mut [T]) {
-        debug_assert!(variables.len() >= self.variables && out.len() == self.outputs.len());
-        if let Some(constants) = &self.constants {
+        debug_assert!(variables.len() >= self.0.variables && out.len() == self.0.outputs.len());
+        if let Some(constants) = &self.0.constants {
             for (value, x) in out.iter_mut().zip(constants) {
                 *value = T::constant(*x);
             }
             return;
         }
-        if self.code.is_empty() {
+        if self.0.code.is_empty() {
             // Nothing but variables.
-            for (value, register) in out.iter_mut().zip(&self.outputs) {
+            for (value, register) in out.iter_mut().zip(&self.0.outputs) {
                 *value = variables[*register as usize];
             }
             return;
         }
-        if scratch.len() < self.registers {
-            scratch.resize(self.registers, T::constant(0.0));
+        if scratch.len() < self.0.registers {
+            scratch.resize(self.0.registers, T::constant(0.0));
         }
-        scratch[..self.variables].copy_from_slice(&variables[..self.variables]);
+        scratch[..self.0.variables].copy_from_slice(&variables[..self.0.variables]);
         self.eval_in(scratch, out);
     }
 
     /// Evaluates all roots, as [`Program::eval`] does, with the variables in the first registers, which stay there.
     pub fn eval_in<T: Value>(&self, registers: &mut Scratch<T>, out: &mut [T]) {
         // What earlier evaluations have left in the other registers is overwritten before it is read.
-        let places = if self.plain.is_some() { self.registers.max(T::REGISTERS) } else { self.registers };
+        let places =
+            if self.0.plain.is_some() { self.0.registers.max(T::REGISTERS) } else { self.0.registers };
         if registers.len() < places {
             registers.resize(places, T::constant(0.0));
         }
-        match (&self.plain, T::numbers(registers)) {
+        match (&self.0.plain, T::numbers(registers)) {
             (Some(plain), Some(numbers)) => plain.run(self, numbers),
             _ => {
-                let registers = &mut registers[..self.registers];
-                for &instruction in &self.code {
+                let registers = &mut registers[..self.0.registers];
+                for &instruction in &self.0.code {
                     let (to, value) = self.value(instruction, registers);
                     registers[to as usize] = value;
                 }
             }
         }
-        match (&self.outputs[..], out) {
+        match (&self.0.outputs[..], out) {
             ([register], [value]) => *value = registers[*register as usize],
             (outputs, out) => {
                 for (value, register) in out.iter_mut().zip(outputs) {
@@ -487,17 +500,17 @@ impl Program {
                 (to, T::select(registers[c as usize], registers[a as usize], registers[b as usize]))
             }
             Instruction::Curve(curve, part, to, a) => {
-                (to, T::curve(&self.curves[curve as usize], part, registers[a as usize]))
+                (to, T::curve(&self.0.curves[curve as usize], part, registers[a as usize]))
             }
             Instruction::Piece(curve, part, to, i, a) => {
                 let (i, a) = (registers[i as usize], registers[a as usize]);
-                (to, T::piece(&self.curves[curve as usize], part, i, a))
+                (to, T::piece(&self.0.curves[curve as usize], part, i, a))
             }
             Instruction::Element(array, to, i) => {
-                (to, T::element(&self.arrays[array as usize], registers[i as usize]))
+                (to, T::element(&self.0.arrays[array as usize], registers[i as usize]))
             }
             Instruction::Field(field, part, to, at) => {
-                (to, T::field(&self.fields[field as usize], part, at.map(|of| registers[of as usize])))
+                (to, T::field(&self.0.fields[field as usize], part, at.map(|of| registers[of as usize])))
             }
         }
     }

@@ -63,7 +63,9 @@ pub use measure::Measure;
 pub use physics::{FieldCache, Flow, Gas, Primitive, Spectrum, Tissue, Units, Wind};
 pub use picture::{Drawn, Footprint, Picture, Texture};
 pub use remedy::{Boundary, Remedy};
-pub use rule::{Interpretation, Outcome, Pattern, Produce, PulseTerms, Pulses, Rule, Solve, Switch};
+pub use rule::{
+    Equations, Interpretation, Outcome, Pattern, Produce, PulseTerms, Pulses, Rule, Solve, Switch,
+};
 pub use scenery::{Camera, Plant, Scenery};
 pub use sheet::Sheet;
 pub use soil::{Bed, HeightGrid, Pour, Relief, Soil, SoilBase};

@@ -7,6 +7,9 @@
 //! right as written; one value for each [`Aggregate`]; `t`; `age`; then one truth value for each [`Switch`], or the
 //! [`Draw`](super::Draw)s of a successor.
 
+use std::ops::Deref;
+use std::sync::Arc;
+
 use super::{
     Aggregate, Algebraic, Boundary, Clock, Condition, ContextPart, Jacobian, KindId, LinearRates,
     SolutionForm, Stepping, Successor, ZeroCrossing,
@@ -142,16 +145,33 @@ pub struct Solve {
     pub guard: Condition,
     /// The place of the clause in the text.
     pub span: Span,
-    /// Parameters with a derivative, in the order of the outputs of `rates`. Parameters without an equation, or with the
-    /// derivative 0, are not listed; they stay constant.
-    pub of: Vec<usize>,
-    /// The derivatives, smooth in all variables while the switches do not change.
-    pub rates: Program,
     /// Conditions inside the equations (`if`, `min`, `max`, `abs`, `sign`).
     pub switches: Vec<Switch>,
     /// By atom of the rule: true if the flow of these equations cannot bring its difference to zero, because the surface on
     /// which it is zero is invariant, as the limit of logistic growth is.
     pub unreachable: Vec<bool>,
+    /// The terms of its equations that may have pulses.
+    pub pulses: Pulses,
+    /// Its equations, compiled once for rules that differ in names only.
+    pub equations: Arc<Equations>,
+}
+
+impl Deref for Solve {
+    type Target = Equations;
+
+    fn deref(&self) -> &Equations {
+        &self.equations
+    }
+}
+
+/// The equations of a clause, with what the analysis found out about them.
+#[derive(Clone, Debug)]
+pub struct Equations {
+    /// Parameters with a derivative, in the order of the outputs of `rates`. Parameters without an equation, or with the
+    /// derivative 0, are not listed; they stay constant.
+    pub of: Vec<usize>,
+    /// The derivatives, smooth in all variables while the switches do not change.
+    pub rates: Program,
     /// The solution form of each equation, in the order of `of`.
     pub solution_forms: Vec<SolutionForm>,
     /// Indices in `of` of the equations that are integrated numerically.
@@ -164,10 +184,8 @@ pub struct Solve {
     pub jacobian: Jacobian,
     /// Parameters with a value or an equation instead of a rate.
     pub algebraic: Algebraic,
-    /// The zero-crossing function of each atom while the clause is active.
+    /// The zero-crossing function of each atom of the rule while the clause is active.
     pub zero_crossings: Vec<ZeroCrossing>,
-    /// The terms of its equations that may have pulses.
-    pub pulses: Pulses,
     /// True if the clock of an event at a rate runs under this clause and some of its equations are integrated numerically;
     /// clocks are integrated to a tolerance of their own.
     pub has_hazard_clock: bool,
@@ -175,7 +193,7 @@ pub struct Solve {
     pub stepping: Stepping,
 }
 
-impl Solve {
+impl Equations {
     /// True if every parameter of the clause has a rate that is integrated numerically.
     pub fn is_all_numeric(&self) -> bool {
         self.numeric.len() == self.of.len() && self.algebraic.is_empty()

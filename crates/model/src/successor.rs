@@ -81,10 +81,6 @@ pub enum Part {
 
 /// A string of modules whose arguments, and with repetitions and conditions also modules, are computed when it is made.
 #[derive(Clone, Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "nearly all are plain, and a box would cost each production a fetch from memory"
-)]
 pub enum Successor {
     /// Without repetitions and conditions.
     Plain(Stretch),

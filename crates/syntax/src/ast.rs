@@ -47,7 +47,7 @@ pub enum ContextPart {
 }
 
 /// A rule, continuous or discrete.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Rule {
     /// The left context in reading order.
     pub left: Vec<HeadModule>,
@@ -70,7 +70,7 @@ pub struct Rule {
 }
 
 /// A clause of a rule.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Clause {
     /// The condition behind `if`, or before the arrow of a discrete rule.
     pub guard: Option<Expression>,
@@ -83,7 +83,7 @@ pub struct Clause {
 }
 
 /// The effect of a clause: equations while its condition holds, or a production when it does.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// Equations that hold while the clause is active.
     Solve(Vec<Equation>),
@@ -92,7 +92,7 @@ pub enum Action {
 }
 
 /// A successor of a clause.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Alternative {
     /// `2:` before it.
     pub weight: Option<Expression>,
@@ -101,7 +101,7 @@ pub struct Alternative {
 }
 
 /// An equation of a `solve`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Equation {
     /// `dx/dt = …`
     Rate {
@@ -140,7 +140,7 @@ impl Equation {
 }
 
 /// A text in quotes, without them, and where it stands.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Text {
     /// The text between the quotes.
     pub text: String,
@@ -149,7 +149,7 @@ pub struct Text {
 }
 
 /// A word within a declaration with the values behind it: `speed 3`, `at 0, 1, 0`, `spectrum kolmogorov 1, 4, 1`, `sag`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Attribute {
     /// The word.
     pub word: Name,
@@ -162,7 +162,7 @@ pub struct Attribute {
 }
 
 /// A declaration or a rule.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Item {
     /// `title "text"`: the name of the model, without the quotes.
     Title(String),

@@ -14,7 +14,7 @@ mod recovery;
 mod tokens;
 
 use crate::declarations::{Begins, Body, Declaration};
-use crate::lexeme::{Lexeme, SUBSCRIPTED, Token, has_subscript, in_name, number_length};
+use crate::lexeme::{Lexeme, SUBSCRIPTED, Token, has_subscript, name_end, number_length};
 use ahead::is_space;
 use dlsys_diagnostic::{Diagnostic, Span};
 
@@ -214,56 +214,53 @@ fn first_char(text: &str, at: usize) -> usize {
     text[at..].chars().next().map_or(0, char::len_utf8)
 }
 
-impl Scanner<'_> {
+impl<'t> Scanner<'t> {
     /// Collects a line's tokens and blanks its comment.
     fn tokenize(&mut self, start: usize, end: usize, tokens: &mut Vec<(Token, usize, usize)>) {
         tokens.clear();
         let line = &self.text[start..end];
-        let mut chars = line.char_indices().peekable();
-        while let Some((i, c)) = chars.next() {
-            let mut take_while = |accept: &dyn Fn(char) -> bool| {
-                while chars.next_if(|(_, c)| accept(*c)).is_some() {}
-                chars.peek().map_or(line.len(), |(j, _)| *j)
-            };
-            let (token, to) = match c {
-                c if c.is_whitespace() => {
-                    if is_space(c) {
-                        self.out[start + i..start + i + c.len_utf8()].fill(b' ');
-                    }
+        let bytes = line.as_bytes();
+        let mut next = 0;
+        while let Some(&byte) = bytes.get(next) {
+            let i = next;
+            let (token, to) = match byte {
+                b' ' => {
+                    next += 1;
                     continue;
                 }
-                '#' => {
+                b'#' => {
                     self.out[start + i..end].fill(b' ');
                     break;
                 }
-                '"' => {
-                    let mut to = take_while(&|c| c != '"');
-                    if chars.next().is_some() {
-                        to += 1;
+                b'"' => (Token::Text, line[i + 1..].find('"').map_or(line.len(), |length| i + length + 2)),
+                b'0'..=b'9' => (Token::Number, i + number_length(&line[i..])),
+                b'(' => (Token::Open, i + 1),
+                b')' => (Token::Close, i + 1),
+                b',' => (Token::Comma, i + 1),
+                b':' => (Token::Colon, i + 1),
+                b'a'..=b'z' | b'A'..=b'Z' => (Token::Word, name_end(line, i + 1)),
+                _ => {
+                    let c = line[i..].chars().next().expect("a character begins here");
+                    let to = i + c.len_utf8();
+                    if c.is_whitespace() {
+                        if is_space(c) {
+                            self.out[start + i..start + to].fill(b' ');
+                        }
+                        next = to;
+                        continue;
                     }
-                    (Token::Text, to)
+                    // A symbol with a subscript: `+_l`.
+                    let subscribed = SUBSCRIPTED.contains(c) && has_subscript(&line[to..]);
+                    let token = if c.is_alphabetic() { Token::Word } else { Token::Symbol };
+                    (token, if subscribed || token == Token::Word { name_end(line, to) } else { to })
                 }
-                c if c.is_alphabetic() => (Token::Word, take_while(&in_name)),
-                c if c.is_ascii_digit() => {
-                    let to = i + number_length(&line[i..]);
-                    while chars.next_if(|(j, _)| *j < to).is_some() {}
-                    (Token::Number, to)
-                }
-                '(' => (Token::Open, i + 1),
-                ')' => (Token::Close, i + 1),
-                ',' => (Token::Comma, i + 1),
-                ':' => (Token::Colon, i + 1),
-                // A symbol with a subscript: `+_l`.
-                c if SUBSCRIPTED.contains(c) && has_subscript(&line[i + c.len_utf8()..]) => {
-                    (Token::Symbol, take_while(&in_name))
-                }
-                c => (Token::Symbol, i + c.len_utf8()),
             };
             tokens.push((token, start + i, start + to));
+            next = to;
         }
     }
 
-    fn word(&self, token: (Token, usize, usize)) -> &str {
+    fn word(&self, token: (Token, usize, usize)) -> &'t str {
         if token.0 == Token::Word { &self.text[token.1..token.2] } else { "" }
     }
 
@@ -272,7 +269,7 @@ impl Scanner<'_> {
             self.line_break(end);
             return;
         };
-        let word = self.word(first).to_owned();
+        let word = self.word(first);
         let in_sum = self.levels.last().is_some_and(|level| level.is_sum);
         let colon = !in_sum && self.has_colon(tokens) && !self.goes_on_with_weight(tokens);
         let arrow = self.arrow_outside_parentheses(tokens);
@@ -281,7 +278,7 @@ impl Scanner<'_> {
             self.goes_on_discrete(start, arrow == Some(first.1));
         }
         let in_string = self.in_string && self.levels.len() == 1;
-        let starts = self.starts_item(&word, colon, arrow.is_some(), tokens);
+        let starts = self.starts_item(word, colon, arrow.is_some(), tokens);
         if let Some(head) = self.head_without_colon(starts, colon, tokens) {
             let kind = if starts == Some(ItemKind::Step) { ItemKind::Step } else { ItemKind::Rule };
             self.begin_without_colon(head, kind);
@@ -310,7 +307,7 @@ impl Scanner<'_> {
             self.last = Last::Operator;
             self.held_break = None;
         } else if let Some(at) = self.held_break.take()
-            && (matches!(word.as_str(), "then" | "else") || word == "case" && self.matching)
+            && (matches!(word, "then" | "else") || word == "case" && self.matching)
         {
             // `then`, `else` and `case` remove the break before them, and any empty lines.
             for byte in &mut self.out[at..start] {

@@ -62,6 +62,26 @@ pub fn in_name(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '_' || !c.is_ascii() && (c.is_alphanumeric() || MARK(c))
 }
 
+/// The end of the characters of a name from a byte on.
+pub fn name_end(text: &str, from: usize) -> usize {
+    let bytes = text.as_bytes();
+    let mut end = from;
+    while let Some(&byte) = bytes.get(end) {
+        if byte.is_ascii() {
+            if !(byte.is_ascii_alphanumeric() || byte == b'_') {
+                break;
+            }
+            end += 1;
+        } else {
+            match text[end..].chars().next() {
+                Some(c) if in_name(c) => end += c.len_utf8(),
+                _ => break,
+            }
+        }
+    }
+    end
+}
+
 /// The symbols that may have a subscript: `+_l(a)` is a turn with a name of its own.
 pub const SUBSCRIPTED: &str = "±+-&^\\/|$!;";
 

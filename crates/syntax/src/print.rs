@@ -52,6 +52,8 @@ enum Task<'e> {
 pub fn expression(expressions: &Expressions, root: ExprId) -> String {
     let mut out = String::new();
     let mut tasks = vec![Task::Node(root, 0)];
+    // In the order of printing; pushed in reverse.
+    let mut parts: Vec<Task> = Vec::new();
     while let Some(task) = tasks.pop() {
         let (id, needed) = match task {
             Task::Text(text) => {
@@ -65,8 +67,6 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
             Task::Node(id, needed) => (id, needed),
         };
         let enclosed = strength(expressions.get(id)) < needed;
-        // In the order of printing; pushed in reverse.
-        let mut parts: Vec<Task> = Vec::new();
         if enclosed {
             parts.push(Task::Text("("));
         }
@@ -74,7 +74,7 @@ pub fn expression(expressions: &Expressions, root: ExprId) -> String {
         if enclosed {
             parts.push(Task::Text(")"));
         }
-        tasks.extend(parts.into_iter().rev());
+        tasks.extend(parts.drain(..).rev());
     }
     out
 }

@@ -3,63 +3,13 @@
 use std::sync::Arc;
 
 use dlsys_expr::{Graph, NodeId, Program};
-use dlsys_model::{Algebraic, Jacobian, LinearRates, Pulses, SolutionForm, Solve, ZeroCrossing};
+use dlsys_model::{Algebraic, Equations, SolutionForm};
 
 use super::crossings::crossing;
 use super::solution_forms::{classify, jacobian, linear};
 use super::stepping::{StepEquations, VariableLayout};
 use super::variability::Constants;
 use crate::declared::{DeclaredSolve, ResolvedRule};
-
-/// The results of the analysis of the equations of a clause.
-#[derive(Clone)]
-pub struct ClauseAnalysis {
-    of: Vec<usize>,
-    rates: Program,
-    pub solution_forms: Vec<SolutionForm>,
-    numeric: Vec<usize>,
-    numeric_rates: Program,
-    linear: Option<LinearRates>,
-    jacobian: Jacobian,
-    algebraic: Algebraic,
-    zero_crossings: Vec<ZeroCrossing>,
-    has_hazard_clock: bool,
-}
-
-impl ClauseAnalysis {
-    /// The compiled clause.
-    pub fn compile(self, solve: DeclaredSolve, pulses: Pulses, layout: &VariableLayout) -> Solve {
-        let equations = StepEquations {
-            of: &self.of,
-            rates: &self.rates,
-            solution_forms: &self.solution_forms,
-            numeric: &self.numeric,
-            numeric_rates: &self.numeric_rates,
-            linear: self.linear.as_ref(),
-            jacobian: &self.jacobian,
-            algebraic: &self.algebraic,
-        };
-        let stepping = equations.stepping(layout);
-        Solve {
-            guard: solve.guard,
-            span: solve.span,
-            of: self.of,
-            rates: self.rates,
-            switches: solve.switches,
-            unreachable: solve.unreachable,
-            solution_forms: self.solution_forms,
-            numeric: self.numeric,
-            numeric_rates: self.numeric_rates,
-            linear: self.linear,
-            jacobian: self.jacobian,
-            algebraic: self.algebraic,
-            zero_crossings: self.zero_crossings,
-            pulses,
-            has_hazard_clock: self.has_hazard_clock,
-            stepping,
-        }
-    }
-}
 
 /// Classifies the equations of a clause. `is_needed` is true for parameters of the module that a rule reads.
 pub fn analyse_clause(
@@ -68,7 +18,8 @@ pub fn analyse_clause(
     solve: &DeclaredSolve,
     constants: &Constants,
     is_needed: &dyn Fn(usize) -> bool,
-) -> ClauseAnalysis {
+    layout: &VariableLayout,
+) -> Equations {
     let declared = &rule.declared;
     let rates = &solve.rates;
     let total = declared.variables + solve.switches.len();
@@ -89,9 +40,22 @@ pub fn analyse_clause(
     let linear = linear(graph, &roots, constants, total);
     let clocked = rates.iter().any(|(p, _)| declared.clocks.iter().any(|clock| clock.parameter == *p));
     let all: Vec<NodeId> = rates.iter().map(|rate| rate.1).collect();
-    ClauseAnalysis {
-        of: rates.iter().map(|(parameter, _)| *parameter).collect(),
-        rates: Program::compile(graph, &all, total),
+    let (of, rates): (Vec<usize>, _) =
+        (rates.iter().map(|(parameter, _)| *parameter).collect(), Program::compile(graph, &all, total));
+    let equations = StepEquations {
+        of: &of,
+        rates: &rates,
+        solution_forms: &solution_forms,
+        numeric: &numeric,
+        numeric_rates: &numeric_rates,
+        linear: linear.as_ref(),
+        jacobian: &jacobian,
+        algebraic: &algebraic,
+    };
+    Equations {
+        stepping: equations.stepping(layout),
+        of,
+        rates,
         has_hazard_clock: clocked && !numeric.is_empty(),
         solution_forms,
         numeric,

@@ -4,8 +4,9 @@
 //! rates with a formula: quadratic, Gompertz's `x (a + b ln x)`, or Bernoulli's `a x + b x^p`, to which the growth laws of
 //! Richards and von Bertalanffy belong. With H the integral of h, the solution is that of `dx/ds = q(x)` at `s = H(time)`.
 
-use std::collections::HashMap;
 use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
 
 use super::invariance::Random;
 use dlsys_expr::{
@@ -75,7 +76,7 @@ fn drivers(
     let is_time = |v: u32| v == time || v == time + 1;
     let (mut found, mut outside) = (Vec::new(), Vec::new());
     let mut stack = vec![root];
-    let mut seen = std::collections::HashSet::from([root]);
+    let mut seen = dlsys_expr::NodeSet::from_iter([root]);
     while let Some(id) = stack.pop() {
         let reads = graph.variables(&[id]);
         let timely =
@@ -181,14 +182,14 @@ struct Products {
     of_x: Vec<Monomial>,
     of_time: Vec<Monomial>,
     /// The coefficient by the places of the two monomials.
-    table: HashMap<(usize, usize), NodeId>,
+    table: FxHashMap<(usize, usize), NodeId>,
 }
 
 impl Products {
     /// Takes a polynomial in x, `age` and the stand-ins apart. None if a monomial of time has no antiderivative that is
     /// known: a product of drivers, or too high a power of `age`.
     fn of(polynomial: &Polynomial, age: u32) -> Option<Products> {
-        let mut all = Products { of_x: Vec::new(), of_time: Vec::new(), table: HashMap::new() };
+        let mut all = Products { of_x: Vec::new(), of_time: Vec::new(), table: FxHashMap::default() };
         let place = |list: &mut Vec<Monomial>, item: Monomial| {
             list.iter().position(|known| *known == item).unwrap_or_else(|| {
                 list.push(item);

@@ -8,7 +8,9 @@
 //! another indeterminate, the same one for the same argument, so that `sin(t) - sin(t)` is zero, and `exp(-(t - 300)^2)` is
 //! not zero even at points where it underflows.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
+
+use rustc_hash::FxHashMap;
 
 use dlsys_expr::{Binary, Curve, Graph, Node, NodeId, NodeMap, Unary, Value};
 
@@ -177,7 +179,7 @@ impl Form {
 /// The indeterminates, by variable or expression.
 #[derive(Clone, Debug, Default)]
 pub struct Indeterminates {
-    numbers: HashMap<String, u32>,
+    numbers: FxHashMap<String, u32>,
 }
 
 impl Indeterminates {

@@ -26,14 +26,16 @@ mod stepping;
 mod variability;
 mod zeros;
 
+use std::sync::Arc;
+
 use rustc_hash::FxHashMap;
 
 use dlsys_expr::{Graph, NodeId, Program};
-use dlsys_model::{Aggregate, Jacobian, Kinds, Pulses, Rule, ZeroCrossing};
+use dlsys_model::{Aggregate, Equations, Jacobian, Kinds, Pulses, Rule, Solve, ZeroCrossing};
 
 use crate::declared::ResolvedRule;
 use crate::gather::watched;
-use clause::{ClauseAnalysis, analyse_clause};
+use clause::analyse_clause;
 use crossings::crossing;
 use stepping::VariableLayout;
 use variability::{Constants, Moving};
@@ -95,8 +97,7 @@ pub fn analyse(graph: &mut Graph, kinds: &Kinds, rules: Vec<ResolvedRule>) -> An
 /// All that the analysis of a rule depends on: rules that differ in names only have the same expressions, and are analysed once.
 #[derive(PartialEq, Eq, Hash)]
 struct Shape {
-    own: usize,
-    variables: usize,
+    layout: VariableLayout,
     sides: Vec<(NodeId, NodeId)>,
     /// By clause: parameters with their rates, and the number of switches.
     clauses: Vec<(Vec<(usize, NodeId)>, usize)>,
@@ -114,8 +115,7 @@ impl Shape {
         }
         let clauses = declared.solves.iter().map(|solve| (solve.rates.clone(), solve.switches.len()));
         Some(Shape {
-            own: declared.own(),
-            variables: declared.variables,
+            layout: VariableLayout::of(rule),
             sides: declared.sides.clone(),
             clauses: clauses.collect(),
             clocks: declared.clocks.iter().map(|clock| clock.parameter).collect(),
@@ -129,7 +129,7 @@ impl Shape {
 pub struct RuleAnalysis {
     zero_crossings_at_rest: Vec<ZeroCrossing>,
     reads_context: bool,
-    clauses: Vec<ClauseAnalysis>,
+    clauses: Vec<Arc<Equations>>,
 }
 
 fn analyse_rule(
@@ -144,6 +144,7 @@ fn analyse_rule(
         .map(|&sides| crossing(graph, sides, &still, &|_| true, declared.variables))
         .collect();
     let mut reads_context = declared.sides.iter().any(|(a, b)| still.reads_context(graph, &[*a, *b]));
+    let layout = VariableLayout::of(rule);
     let mut clauses = Vec::with_capacity(declared.solves.len());
     for solve in &declared.solves {
         let constants = still.under(solve);
@@ -151,7 +152,7 @@ fn analyse_rule(
         reads_context |= constants.reads_context(graph, &nodes);
         let given: Vec<NodeId> = solve.algebraic.iter().map(|entry| entry.node).collect();
         reads_context |= constants.reads_context(graph, &given);
-        clauses.push(analyse_clause(graph, rule, solve, &constants, is_needed));
+        clauses.push(Arc::new(analyse_clause(graph, rule, solve, &constants, is_needed, &layout)));
     }
     RuleAnalysis { zero_crossings_at_rest, reads_context, clauses }
 }
@@ -215,19 +216,26 @@ fn atom_reads(sides: &Program, atom: usize) -> Vec<usize> {
 
 /// Combines the declared rule with the results of its analysis. `moving` contains the variables of the context that change.
 fn compile_rule(
-    graph: &Graph,
+    graph: &mut Graph,
     rule: ResolvedRule,
     found: RuleAnalysis,
     aggregates: Vec<Aggregate>,
     moving: Vec<usize>,
     pulses: Vec<Pulses>,
 ) -> Rule {
-    let layout = VariableLayout::of(&rule);
     let ResolvedRule { declared, left, right, .. } = rule;
     let count = declared.variables;
     let sides: Vec<NodeId> = declared.side_nodes().collect();
-    let sides = Program::compile(graph, &sides, count);
+    let sides = graph.program(&sides, count);
     let solves = declared.solves.into_iter().zip(found.clauses).zip(pulses);
+    let solves = solves.map(|((solve, equations), pulses)| Solve {
+        guard: solve.guard,
+        span: solve.span,
+        switches: solve.switches,
+        unreachable: solve.unreachable,
+        pulses,
+        equations,
+    });
     Rule {
         index: declared.index,
         label: declared.label,
@@ -248,7 +256,7 @@ fn compile_rule(
         atoms: declared.atoms,
         boundaries: declared.boundaries,
         jumping: declared.jumping,
-        solves: solves.map(|((solve, clause), pulses)| clause.compile(solve, pulses, &layout)).collect(),
+        solves: solves.collect(),
         produces: declared.produces,
         hidden: declared.hidden,
         clocks: declared.clocks,

@@ -1,6 +1,6 @@
 //! The parameters that rates, conditions and productions read; others need no computation until they are observed.
 
-use rustc_hash::FxHashSet;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use dlsys_expr::{Graph, NodeId};
 use dlsys_model::Kinds;
@@ -69,17 +69,37 @@ fn reads(graph: &Graph, nodes: &[NodeId]) -> Vec<usize> {
     graph.variables(nodes).into_iter().map(|v| v as usize).collect()
 }
 
+/// The same for many rules, of which those that differ in names only have the same expressions.
+struct Reads<'g> {
+    graph: &'g Graph,
+    known: FxHashMap<Box<[NodeId]>, Vec<usize>>,
+}
+
+impl<'g> Reads<'g> {
+    fn new(graph: &'g Graph) -> Reads<'g> {
+        Reads { graph, known: FxHashMap::default() }
+    }
+
+    fn of(&mut self, nodes: &[NodeId]) -> &[usize] {
+        if !self.known.contains_key(nodes) {
+            self.known.insert(nodes.into(), reads(self.graph, nodes));
+        }
+        &self.known[nodes]
+    }
+}
+
 /// The parameters that rates and conditions read, directly or through algebraic parameters.
 pub fn needed(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> ParameterSet {
     let owners = Owners::new(graph, kinds, rules);
     let mut read = ParameterSet::default();
+    let mut reads = Reads::new(graph);
     for (index, ResolvedRule { declared, .. }) in rules.iter().enumerate() {
         // An implicit parameter is solved for in each step: occasional solves might converge to another solution.
         for entry in declared.algebraic().filter(|entry| !entry.explicit) {
             owners.add(index, entry.parameter, &mut read);
         }
         let nodes: Vec<NodeId> = declared.side_nodes().chain(declared.rates().map(|rate| rate.1)).collect();
-        for v in reads(graph, &nodes) {
+        for &v in reads.of(&nodes) {
             owners.add(index, v, &mut read);
         }
     }
@@ -90,7 +110,7 @@ pub fn needed(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> Parameter
                 let is_read = |p: usize| owners.kinds_of[index].iter().any(|kind| read.contains(&(*kind, p)));
                 let known = clause.algebraic.iter().filter(|e| !e.explicit || is_read(e.parameter));
                 let nodes: Vec<NodeId> = known.map(|e| e.node).collect();
-                for v in reads(graph, &nodes) {
+                for &v in reads.of(&nodes) {
                     owners.add(index, v, &mut read);
                 }
             }
@@ -105,12 +125,13 @@ pub fn needed(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> Parameter
 pub fn drawn_only(graph: &Graph, kinds: &Kinds, rules: &[ResolvedRule]) -> Vec<Vec<bool>> {
     let owners = Owners::new(graph, kinds, rules);
     let mut read = ParameterSet::default();
+    let mut reads = Reads::new(graph);
     for (index, ResolvedRule { declared, .. }) in rules.iter().enumerate() {
         let sides: Vec<NodeId> = declared.side_nodes().collect();
-        let mut variables = reads(graph, &sides);
+        let mut variables = reads.of(&sides).to_vec();
         let algebraic = declared.algebraic().map(|entry| (entry.parameter, entry.node));
         for (parameter, node) in declared.rates().chain(algebraic) {
-            variables.extend(reads(graph, &[node]).into_iter().filter(|v| *v != parameter));
+            variables.extend(reads.of(&[node]).iter().copied().filter(|v| *v != parameter));
         }
         variables.extend(declared.produces.iter().flat_map(|p| p.outcome.reads()));
         for v in variables {

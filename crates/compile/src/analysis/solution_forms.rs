@@ -1,6 +1,6 @@
 //! Classification of the equations of a clause: by formula or by numerical integration.
 
-use std::collections::HashSet;
+use rustc_hash::FxHashSet;
 
 use dlsys_expr::{Binary, Graph, Monomial, Node, NodeId, Polynomial, Program, Unary};
 use dlsys_model::{Jacobian, LinearRates, Numeric, Obstacle, SolutionForm};
@@ -20,7 +20,7 @@ pub fn classify(
 ) -> Vec<SolutionForm> {
     let mut found: Vec<Option<SolutionForm>> = vec![None; rates.len()];
     // Parameters known to be sums of exponentials and polynomials.
-    let mut sums: HashSet<u32> = HashSet::new();
+    let mut sums: FxHashSet<u32> = FxHashSet::default();
     loop {
         let mut progress = false;
         for (i, &(parameter, rate)) in rates.iter().enumerate() {
@@ -75,7 +75,7 @@ fn closed(
     parameter: u32,
     rate: NodeId,
     constants: &Constants,
-    sums: &HashSet<u32>,
+    sums: &FxHashSet<u32>,
     total: usize,
 ) -> Option<(SolutionForm, bool)> {
     let zero = graph.constant(0.0);
@@ -128,7 +128,7 @@ fn driven(
 
 /// True if an expression consists of sums and products of constants, time, exponentials, sines and cosines of time, and
 /// parameters whose solutions are such sums.
-fn is_sum(graph: &mut Graph, root: NodeId, constants: &Constants, sums: &HashSet<u32>) -> bool {
+fn is_sum(graph: &mut Graph, root: NodeId, constants: &Constants, sums: &FxHashSet<u32>) -> bool {
     let is_time = |v: u32| v as usize == constants.time || v as usize == constants.time + 1;
     for id in graph.reachable(&[root]) {
         if constants.all_constant(graph, &[id]) {

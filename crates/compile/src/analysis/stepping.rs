@@ -6,6 +6,7 @@ use dlsys_model::{Algebraic, Jacobian, LinearRates, Read, SolutionForm, Stepping
 use super::ResolvedRule;
 
 /// The layout of the variables of a rule.
+#[derive(Clone, PartialEq, Eq, Hash)]
 pub struct VariableLayout {
     /// Number of the module's own parameters.
     own: usize,
@@ -28,7 +29,7 @@ impl VariableLayout {
     }
 }
 
-/// The equations of a clause; the fields are those of [`dlsys_model::Solve`].
+/// The equations of a clause; the fields are those of [`dlsys_model::Equations`].
 pub struct StepEquations<'e> {
     pub of: &'e [usize],
     pub rates: &'e Program,

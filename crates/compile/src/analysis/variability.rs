@@ -1,6 +1,6 @@
 //! The variables that are constant between events, and those that change.
 
-use std::collections::HashSet;
+use rustc_hash::FxHashSet;
 
 use dlsys_expr::{Graph, NodeId};
 use dlsys_model::{Kinds, Pattern};
@@ -68,7 +68,7 @@ pub struct Constants<'a> {
     /// Number of the module's own parameters.
     pub own: usize,
     /// Own parameters with an equation.
-    of: HashSet<usize>,
+    of: FxHashSet<usize>,
     /// By variable of the context, then by aggregate: true if it changes.
     moving: &'a [bool],
     /// Index of `t`; `age` is the next.
@@ -78,7 +78,7 @@ pub struct Constants<'a> {
 impl<'a> Constants<'a> {
     /// The state without an active clause. `moving` is true for variables of the context and aggregates that change.
     pub fn at_rest(rule: &DeclaredRule, moving: &'a [bool]) -> Constants<'a> {
-        Constants { own: rule.own(), of: HashSet::new(), moving, time: rule.time() }
+        Constants { own: rule.own(), of: FxHashSet::default(), moving, time: rule.time() }
     }
 
     /// The state while this clause is active.

@@ -135,7 +135,7 @@ impl Program {
         rows: usize,
     ) -> impl ExactSizeIterator<Item = usize> + '_ {
         dlsys_wide::run(Run { program: self, registers, rows });
-        self.outputs.iter().map(|&register| register as usize)
+        self.0.outputs.iter().map(|&register| register as usize)
     }
 
     /// The same with registers of a given width.
@@ -147,7 +147,7 @@ impl Program {
         rows: usize,
     ) -> impl ExactSizeIterator<Item = usize> + '_ {
         dlsys_wide::run_with(width, Run { program: self, registers, rows });
-        self.outputs.iter().map(|&register| register as usize)
+        self.0.outputs.iter().map(|&register| register as usize)
     }
 
     /// The same inside a [`Kernel`], of which it becomes a part.
@@ -157,8 +157,8 @@ impl Program {
         registers: &mut Vec<Lanes>,
         rows: usize,
     ) -> impl ExactSizeIterator<Item = usize> + '_ {
-        if registers.len() < self.registers {
-            registers.resize(self.registers, Lanes::default());
+        if registers.len() < self.0.registers {
+            registers.resize(self.0.registers, Lanes::default());
         }
         // Loops of a length that is known when this is compiled take two thirds of the instructions.
         match rows.div_ceil(PART) {
@@ -166,13 +166,13 @@ impl Program {
             2 => self.run::<2>(registers, rows),
             _ => self.run::<{ LANES / PART }>(registers, rows),
         }
-        self.outputs.iter().map(|&register| register as usize)
+        self.0.outputs.iter().map(|&register| register as usize)
     }
 
     /// Carries out all instructions for so many parts of the lanes, of which `rows` lanes count.
     #[inline(always)]
     fn run<const PARTS: usize>(&self, registers: &mut [Lanes], rows: usize) {
-        for instruction in &self.code {
+        for instruction in &self.0.code {
             match *instruction {
                 Instruction::Const(to, x) => each::<PARTS>(registers, [to, to, to], |_, _| x),
                 Instruction::Unary(Unary::Neg, to, a) => each::<PARTS>(registers, [to, a, a], |x, _| -x),
@@ -259,19 +259,19 @@ impl Program {
                 registers[to as usize] = Lanes(std::array::from_fn(|i| f64::select(c[i], a[i], b[i])));
             }
             Instruction::Curve(curve, part, to, a) => {
-                let curve = &self.curves[curve as usize];
+                let curve = &self.0.curves[curve as usize];
                 each_of(registers, rows, [to, a, a], &mut |x, _| curve.eval(part, x));
             }
             Instruction::Piece(curve, part, to, i, a) => {
-                let curve = &self.curves[curve as usize];
+                let curve = &self.0.curves[curve as usize];
                 each_of(registers, rows, [to, i, a], &mut |i, x| curve.continued(part, i, x));
             }
             Instruction::Element(array, to, i) => {
-                let array = &self.arrays[array as usize];
+                let array = &self.0.arrays[array as usize];
                 each_of(registers, rows, [to, i, i], &mut |i, _| array.element(i));
             }
             Instruction::Field(field, part, to, at) => {
-                let (field, at) = (&self.fields[field as usize], at.map(|of| registers[of as usize]));
+                let (field, at) = (&self.0.fields[field as usize], at.map(|of| registers[of as usize]));
                 let value = |i: usize| field.value(part, [at[0][i], at[1][i], at[2][i], at[3][i]]);
                 registers[to as usize] =
                     Lanes(std::array::from_fn(|i| if i < rows { value(i) } else { f64::NAN }));

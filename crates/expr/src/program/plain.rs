@@ -181,5 +181,5 @@ impl Plain {
 /// The value of an instruction in its long form. It stays out of the loop above, which would set out with all that this may take.
 #[inline(never)]
 fn other(program: &Program, place: usize, registers: &[f64; REGISTERS]) -> f64 {
-    program.value(program.code[place], &registers[..]).1
+    program.value(program.0.code[place], &registers[..]).1
 }

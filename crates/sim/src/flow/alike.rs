@@ -273,9 +273,7 @@ impl FlowStage<'_, '_> {
         let (mut moving, mut others) = (None, is_timed || *age || state.next.near() != 0);
         for (parameter, value) in values.iter().enumerate() {
             match state.trajectories.get(parameter) {
-                None | Some(Law::Rest) if parameters & 1 << parameter != 0 => {
-                    words.push(value.to_bits())
-                }
+                None | Some(Law::Rest) if parameters & 1 << parameter != 0 => words.push(value.to_bits()),
                 None | Some(Law::Rest) => {}
                 Some(Law::Step(_)) if moving.is_none() => moving = Some(*value),
                 Some(_) => others = true,

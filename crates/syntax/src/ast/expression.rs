@@ -101,6 +101,17 @@ impl Expressions {
         ExprId(self.nodes.len() as u32)
     }
 
+    /// Removes the nodes from `first` on, and gives them.
+    pub(crate) fn split_off(&mut self, first: ExprId) -> Expressions {
+        let from = first.0 as usize;
+        Expressions { nodes: self.nodes.split_off(from), spans: self.spans.split_off(from) }
+    }
+
+    /// The nodes from `first` on, with their places.
+    pub(crate) fn since(&self, first: ExprId) -> (&[Expr], &[Span]) {
+        (&self.nodes[first.0 as usize..], &self.spans[first.0 as usize..])
+    }
+
     /// A node of this arena.
     pub fn get(&self, id: ExprId) -> &Expr {
         &self.nodes[id.0 as usize]

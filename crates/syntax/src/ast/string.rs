@@ -6,7 +6,7 @@ use super::{Expression, Name};
 use dlsys_diagnostic::Span;
 
 /// A module of the initial string or of a successor.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Module {
     /// The name with its mark, as in `F`, `@L` or `+`.
     pub name: Arc<str>,
@@ -17,7 +17,7 @@ pub struct Module {
 }
 
 /// A part of a string of modules.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Part {
     /// A module.
     Module(Module),
@@ -28,7 +28,7 @@ pub enum Part {
 }
 
 /// A repeated part of a string: `for i in A .. B: ( … )`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Repetition {
     /// The name of the index, in the body only.
     pub index: Name,
@@ -43,7 +43,7 @@ pub struct Repetition {
 }
 
 /// A part of a string under a condition: `if C: ( … ) else ( … )`.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Conditional {
     /// The condition.
     pub condition: Expression,

@@ -153,9 +153,7 @@ impl Builder<'_> {
             }
         }
         let predecessor = predecessor.expect("the grammar has a predecessor here");
-        let nodes = (ExprId(0), ExprId(0));
-        let (locals, clauses) = (Vec::new(), Vec::new());
-        ast::Rule { left, predecessor, right, right_shape, head, discrete: false, locals, clauses, nodes }
+        with_head(left, predecessor, (right, right_shape), head)
     }
 
     fn clause(&mut self, pair: Pair) -> Built<Clause> {
@@ -311,6 +309,18 @@ impl Builder<'_> {
         }
         Ok(Module { name, span, arguments })
     }
+}
+
+/// A continuous rule that has its head alone so far.
+pub(super) fn with_head(
+    left: Vec<HeadModule>,
+    predecessor: HeadModule,
+    (right, right_shape): (Vec<HeadModule>, Vec<ContextPart>),
+    head: Span,
+) -> ast::Rule {
+    let nodes = (ExprId(0), ExprId(0));
+    let (locals, clauses) = (Vec::new(), Vec::new());
+    ast::Rule { left, predecessor, right, right_shape, head, discrete: false, locals, clauses, nodes }
 }
 
 /// True for signs and words that carry no information after parsing.

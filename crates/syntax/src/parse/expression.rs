@@ -42,31 +42,48 @@ impl Builder<'_> {
             .map_prefix(|op, operand| {
                 let operand = operand?;
                 let this = &mut *this.borrow_mut();
-                let span = this.span(&op).to(this.expressions.span(operand));
                 let node = match op.as_rule() {
                     Rule::neg => Expr::Negate(operand),
                     Rule::not => Expr::Not(operand),
                     _ => Expr::Scale(this.number(&op)?, operand),
                 };
-                Ok(this.expressions.push(node, span))
+                Ok(this.prefixed(this.span(&op), node, operand))
             })
-            .map_infix(|a, op, b| {
-                let (a, b) = (a?, b?);
-                let this = &mut *this.borrow_mut();
-                let span = this.expressions.span(a).to(this.expressions.span(b));
-                let operator = match op.as_str().trim_end() {
-                    "+" => Operator::Add,
-                    "-" => Operator::Sub,
-                    "*" | "·" => Operator::Mul,
-                    "/" => Operator::Div,
-                    "^" => Operator::Pow,
-                    "&" => Operator::And,
-                    "|" => Operator::Or,
-                    comparison => return Ok(this.compare(a, comparison, b, span)),
-                };
-                Ok(this.expressions.push(Expr::Binary(operator, a, b), span))
-            })
+            .map_infix(|a, op, b| Ok(this.borrow_mut().infix(a?, op.as_str().trim_end(), b?)))
             .parse(pair.into_inner().filter(|p| p.as_rule() != Rule::close))
+    }
+
+    /// An operand behind a sign or a number.
+    pub(super) fn prefixed(&mut self, sign: Span, node: Expr, operand: ExprId) -> ExprId {
+        let span = sign.to(self.expressions.span(operand));
+        self.expressions.push(node, span)
+    }
+
+    /// Two operands with a sign between them.
+    pub(super) fn infix(&mut self, a: ExprId, sign: &str, b: ExprId) -> ExprId {
+        let span = self.expressions.span(a).to(self.expressions.span(b));
+        let operator = match sign {
+            "+" => Operator::Add,
+            "-" => Operator::Sub,
+            "*" | "·" => Operator::Mul,
+            "/" => Operator::Div,
+            "^" => Operator::Pow,
+            "&" => Operator::And,
+            "|" => Operator::Or,
+            comparison => return self.compare(a, comparison, b, span),
+        };
+        self.expressions.push(Expr::Binary(operator, a, b), span)
+    }
+
+    /// `if c then a else if d then b else e`, of which the parts are c, a, d, b, e: from the last branch forward.
+    pub(super) fn choice(&mut self, mut parts: Vec<ExprId>, span: Span) -> ExprId {
+        let mut otherwise = parts.pop().expect("an `if` has an else");
+        while let (Some(then), Some(condition)) = (parts.pop(), parts.pop()) {
+            let span = self.expressions.span(condition).to(self.expressions.span(otherwise));
+            otherwise = self.expressions.push(Expr::If(condition, then, otherwise), span);
+        }
+        self.expressions.widen(otherwise, span);
+        otherwise
     }
 
     /// A comparison, or one more link of a chain.
@@ -143,15 +160,8 @@ impl Builder<'_> {
             Rule::aggregate => self.aggregate(pair),
             Rule::if_expr => {
                 let parts = pair.into_inner().filter(|p| p.as_rule() == Rule::expr);
-                let mut parts = parts.map(|p| self.expr(p)).collect::<Built<Vec<_>>>()?;
-                // if c then a else if d then b else e: from the last branch forward.
-                let mut otherwise = parts.pop().expect("an `if` has an else");
-                while let (Some(then), Some(condition)) = (parts.pop(), parts.pop()) {
-                    let span = self.expressions.span(condition).to(self.expressions.span(otherwise));
-                    otherwise = self.expressions.push(Expr::If(condition, then, otherwise), span);
-                }
-                self.expressions.widen(otherwise, span);
-                Ok(otherwise)
+                let parts = parts.map(|p| self.expr(p)).collect::<Built<Vec<_>>>()?;
+                Ok(self.choice(parts, span))
             }
             Rule::indexed => {
                 let mut inner = pair.into_inner();

@@ -2,12 +2,14 @@
 //!
 //! ```text
 //! text ──layout──▶ items ──pest──▶ pairs ──build──▶ Document
+//!                        └────────direct───────────────▲
 //! ```
 //!
 //! Each item is parsed separately, so that an error in one does not affect the others.
 
 mod advice;
 pub(crate) mod build;
+mod direct;
 mod expected;
 mod expression;
 mod hints;
@@ -17,7 +19,7 @@ use std::collections::HashSet;
 use pest::Parser;
 
 use crate::Errors;
-use crate::ast::{Document, Expression, HeadModule, Item, Part, modules_of};
+use crate::ast::{self, Document, Expression, HeadModule, Item, Part, modules_of};
 use crate::declarations::{Body, Named};
 use crate::foreign_lines::Stray;
 use crate::grammar::{Grammar, Pair, Rule};
@@ -237,8 +239,34 @@ fn read_item(text: &str, item: &RawItem, builder: &mut build::Builder) -> Result
         ItemKind::Unknown => return Err(Box::new(expected::unknown_line(text, item))),
     };
     builder.offset = item.start;
-    let pair = pest_parse(rule, &text[item.start..item.end], item.start)?;
-    builder.item(pair)
+    let text = &text[item.start..item.end];
+    directly_or(
+        builder,
+        |builder| direct::item(rule, text, builder),
+        |builder| builder.item(pest_parse(rule, text, item.start)?),
+    )
+}
+
+/// What `direct` reads, or what the grammar does where that gives up. With debug assertions both read, and must agree.
+fn directly_or<T: PartialEq>(
+    builder: &mut build::Builder,
+    direct: impl FnOnce(&mut build::Builder) -> Option<T>,
+    grammar: impl FnOnce(&mut build::Builder) -> build::Built<T>,
+) -> build::Built<T> {
+    let first = builder.expressions.next();
+    let read = direct(builder);
+    if !cfg!(debug_assertions)
+        && let Some(read) = read
+    {
+        return Ok(read);
+    }
+    let nodes = builder.expressions.split_off(first);
+    let by_grammar = grammar(builder);
+    if read.is_some() {
+        assert!(by_grammar.as_ref().ok() == read.as_ref(), "both readers give the same tree");
+        assert!(builder.expressions.since(first) == nodes.since(ast::ExprId(0)), "with the same expressions");
+    }
+    by_grammar
 }
 
 /// Parses the initial string piece by piece, so that the parser's memory does not grow with the string.
@@ -275,10 +303,11 @@ fn read_axiom(text: &str, item: &RawItem, builder: &mut build::Builder) -> Resul
             break;
         }
         builder.offset = at;
-        let pair = pest_parse(Rule::modules, piece, at)?;
-        for part in pair.into_inner() {
-            modules.extend(builder.part(part)?);
-        }
+        modules.extend(directly_or(
+            builder,
+            |builder| direct::modules(piece, builder),
+            |builder| builder.successor(pest_parse(Rule::modules, piece, at)?),
+        )?);
         if modules.len() > MAX_AXIOM
             && let Some(last) = modules_of(&modules[MAX_AXIOM..]).next()
         {
