@@ -14,6 +14,7 @@ use dlsys_expr::{Binary, Dual, Interval, Program, Scratch, Value};
 use dlsys_model::{AffineSum, Rule, Sign, ZeroCrossing};
 use dlsys_ode::{Function, Root, first_root};
 use dlsys_tree::SimTime;
+use smallvec::SmallVec;
 
 /// A difference of two sides counts as zero up to this many times the size of the sides.
 pub const TOUCH: f64 = 256.0 * f64::EPSILON;
@@ -345,9 +346,16 @@ impl CrossingDetector {
             || path.rule.atom_reads[atom].iter().any(|variable| path.is_function(*variable));
         match jumps {
             true => there <= self.rounding(path, atom, at),
-            // Where it passes through infinity, rounding does so, too.
-            false => self.widened(path, atom, at).bounded,
+            false => self.is_bounded_around(path, atom, at),
         }
+    }
+
+    /// False where a difference passes through infinity: the rounding of a variable on its way, which is larger than that of a value near 0,
+    /// takes it there, too.
+    fn is_bounded_around(&mut self, path: &Path, atom: usize, at: f64) -> bool {
+        path.over(0.0, 1.0, &mut self.bounds);
+        let sizes: SmallVec<[f64; 16]> = self.bounds.iter().map(|bounds| bounds.value.magnitude()).collect();
+        self.widened_by(path, atom, at, &sizes).bounded
     }
 
     /// The effect of the rounding of the variables on the difference of two sides; 0 where the difference jumps.
@@ -365,9 +373,15 @@ impl CrossingDetector {
 
     /// What the rounding of the variables does to two sides.
     fn widened(&mut self, path: &Path, atom: usize, at: f64) -> Widened {
+        self.widened_by(path, atom, at, &[])
+    }
+
+    /// The same of variables that are rounded as if they were of these sizes, or of their own, if that is larger.
+    fn widened_by(&mut self, path: &Path, atom: usize, at: f64, sizes: &[f64]) -> Widened {
         path.over(at, at, &mut self.bounds);
-        for variable in &mut self.bounds {
-            let width = 64.0 * f64::EPSILON * variable.value.magnitude();
+        for (number, variable) in self.bounds.iter_mut().enumerate() {
+            let size = sizes.get(number).copied().unwrap_or(0.0).max(variable.value.magnitude());
+            let width = 64.0 * f64::EPSILON * size;
             variable.value.lo -= width;
             variable.value.hi += width;
         }
