@@ -192,7 +192,12 @@ impl<F: Function> Search<'_, F> {
         }
         let position = bracket(self.f, lo, hi, sign);
         // It jumps where its bounds say that it does not, as above.
-        let step = steepest.map_or(f64::INFINITY, |rate| 16.0 * f64::EPSILON * hi * rate);
+        let step = match steepest {
+            Some(rate) if rate.is_finite() => 16.0 * f64::EPSILON * hi * rate,
+            // Through infinity, or as steep as that.
+            Some(_) => 0.0,
+            None => f64::INFINITY,
+        };
         let there = self.f.value(position);
         if there.abs() > self.tolerance + step && Sign::of(there) == exact {
             return Some(Root { position, at: exact, after: exact });
