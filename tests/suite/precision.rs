@@ -322,12 +322,12 @@ fn differences_of_large_numbers_meet_their_levels() {
 
 #[test]
 fn what_jumps_over_a_level_does_not_meet_it() {
-    let text = "initial string: A(0, 0) C(0) D(0)\nA(x, v):\n solve dx/dt = 1, v = 2*floor(x)\n if v = 3 produce B\nC(x):\n solve dx/dt = 1\n if 2*floor(x) = 3 produce B\nD(x):\n solve dx/dt = cos(x)\n if 1/(x - 0.5) = 0 produce B\nB: if t < 0 produce ε";
+    let text = "initial string: A(0, 0) C(0) D(0) Q(1, 0.34) R(0.34) T(1, 0.34)\nA(x, v):\n solve dx/dt = 1, v = 2*floor(x)\n if v = 3 produce B\nC(x):\n solve dx/dt = 1\n if 2*floor(x) = 3 produce B\nQ(x, n):\n solve dx/dt = 1, dn/dt = -0.3\n if x/n = 0.5 produce B\nR(n):\n solve dn/dt = -0.3\n if 1/n = -0.05 produce B\nT(x, n):\n solve dx/dt = 1, dn/dt = -0.3\n if atan(x/n) = 0.35 & n < 0.1 produce B\nD(x):\n solve dx/dt = cos(x)\n if 1/(x - 0.5) = 0 produce B\nB: if t < 0 produce ε";
     for method in [Method::Auto, Method::Radau] {
         let settings = Settings { method, ..Settings::default() };
         let strings = run(text, settings, &[1.0, 2.0, 5.0]).expect("runs");
         let names: Vec<&str> = strings.iter().flatten().map(|(name, _)| &**name).collect();
-        assert_eq!(names, ["A", "C", "D"].repeat(3), "{method:?}");
+        assert_eq!(names, ["A", "C", "D", "Q", "R", "T"].repeat(3), "{method:?}");
     }
 }
 
@@ -427,6 +427,34 @@ fn a_narrow_window_may_be_written_out() {
                 let (_, values) = found[0].iter().find(|(name, _)| name == "A").expect("a module");
                 assert_eq!(values[..2], [2.0, 0.0], "{text}");
             }
+        }
+    }
+}
+
+/// What stands alone keeps its digits however small it is, beside what is driven, too.
+#[test]
+fn small_values_of_one_module_keep_their_digits() {
+    let growing = "initial string: S(0, 0) C(1, 1e-60)\nS(t_0, e):\n solve dt_0/dt = 1\n if t_0 = 100 produce S(0, 1)\nS(t_0, e) < C(c, x): solve dc/dt = -c - c^3 + e, dx/dt = x*e*(22 + 10*sin(9*c))";
+    let tight = Settings { method: Method::Dop853, tolerance: 1e-12, ..Settings::default() };
+    // From the time at which it is driven on: c has decayed to nothing by then.
+    let fresh = run(
+        "initial string: C(0, 1e-60)\nC(c, x): solve dc/dt = -c - c^3 + 1, dx/dt = x*(22 + 10*sin(9*c))",
+        tight,
+        &[7.0],
+    );
+    let wanted = fresh.expect("runs")[0][0].1[1];
+    let alike = "initial string: A(1e-25, 2e-25)\nA(x, y):\n solve dx/dt = x*(2 + sin(t)), dy/dt = 0.5*y + 0.1*x\n if x = y produce B(t)\nB(t_0): if t < 0 produce ε";
+    for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau] {
+        for tolerance in [1e-4, 1e-6, 1e-8] {
+            let settings = Settings { method, tolerance, ..Settings::default() };
+            let x = run(growing, settings, &[107.0]).expect("runs")[0][1].1[1];
+            // Sixty decades grow by a factor of e^138, and errors of c with them.
+            assert!(
+                (x / wanted - 1.0).abs() < 1000.0 * tolerance,
+                "{method:?} {tolerance:e}: {x}, not {wanted}"
+            );
+            let met = run(alike, settings, &[3.0]).expect("runs")[0][0].1[0];
+            assert!((met - 0.423347).abs() < 10.0 * tolerance + 1e-6, "{method:?} {tolerance:e}: {met}");
         }
     }
 }

@@ -237,7 +237,7 @@ impl Stepper {
         };
         self.work.resolution = if system.is_timed() { start.resolution() } else { 0.0 };
         self.work.tick = if system.reads_clock() { start.resolution() } else { 0.0 };
-        self.work.find_floor(system, y, start.resolution());
+        self.work.find_floor(system, y);
         // A step below the resolution of time would be made for ever.
         if grid.is_some() && first <= 0.5 * start.resolution() {
             return Err(Error::StepTooSmall(self.work.worst(y)));

@@ -222,13 +222,12 @@ impl Workspace {
     }
 
     /// Finds below which size of a component errors are ignored. What grows by itself keeps its relative error however small it is, and may
-    /// become large; among components of several modules that would make steps short where next to nothing of something has arrived. What
-    /// grows at once, given the resolution of time, does not do so by itself: something flows in.
-    pub(crate) fn find_floor(&mut self, system: &impl Rates, y: &[f64], resolution: f64) {
-        let tiny = || y.iter().zip(self.k[0].iter()).filter(|(y, _)| **y != 0.0 && y.abs() < FLOOR);
-        let grows = |(y, rate): (&f64, &f64)| *rate != 0.0 && (*y > 0.0) == (*rate > 0.0);
-        let flows_in = |(y, rate): (&f64, &f64)| (rate * resolution).abs() >= y.abs();
-        let is_least = system.stands_alone() && tiny().any(grows) && !tiny().any(flows_in);
+    /// become large; among components of several modules that would make steps short where next to nothing of something has arrived.
+    pub(crate) fn find_floor(&mut self, system: &impl Rates, y: &[f64]) {
+        let grows = |(y, rate): (&f64, &f64)| {
+            *y != 0.0 && y.abs() < FLOOR && *rate != 0.0 && (*y > 0.0) == (*rate > 0.0)
+        };
+        let is_least = system.stands_alone() && y.iter().zip(self.k[0].iter()).any(grows);
         self.floor = if is_least { LEAST } else { FLOOR };
     }
 

@@ -267,7 +267,7 @@ impl CrossingDetector {
                 tolerance = tolerance.max(noise).max(self.rounding(path, atom, from));
             }
         }
-        if matches!(sign, Sign::Zero | Sign::Any) && path.error() > 0.0 {
+        if matches!(sign, Sign::Zero | Sign::Any) && path.reads_others() && path.error() > 0.0 {
             tolerance = tolerance.max(self.least_noise(path, atom, from));
         }
         let Root { position, mut at, mut after } = loop {

@@ -351,10 +351,12 @@ impl CrossingDetector {
         );
         // By each term for itself, bounds of what is written out (`x^2 - 2*x + 1`) are far too wide.
         let width = if is_sum || width == 0.0 { width } else { width.min(self.sensitivity(path, atom, at)) };
-        // What is compared with a number may be next to nothing and follow its own size all the same; of two that differ by less than
+        // What stands alone, or is compared with a number, may be next to nothing and follow its own size all the same; of two that differ by less than
         // what is followed nobody knows which is larger.
-        let is_tiny =
-            width < path.error() * NEXT_TO_NOTHING && half_width(a, a) > 0.0 && half_width(b, b) > 0.0;
+        let is_tiny = path.reads_others()
+            && width < path.error() * NEXT_TO_NOTHING
+            && half_width(a, a) > 0.0
+            && half_width(b, b) > 0.0;
         let width = if is_tiny { width.max(self.least_noise(path, atom, at)) } else { width };
         // A wider one is that of a jump.
         let is_jump = || width > FAR * path.error() * a.magnitude().max(b.magnitude()).max(1.0);

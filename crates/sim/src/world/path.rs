@@ -263,6 +263,11 @@ impl<'p> Path<'p> {
         );
     }
 
+    /// False for modules that stand alone, whose values are followed to their own accuracy however small they are.
+    pub fn reads_others(&self) -> bool {
+        self.state.coupled || !self.state.context.context().is_empty()
+    }
+
     /// True if some of these variables is integrated: it follows dense output, or is a sum in which something does.
     pub fn is_integrated(&self, variables: &[usize]) -> bool {
         variables.iter().any(|&variable| {

@@ -198,7 +198,7 @@ impl OneStep for Radau {
         }
         let modules = system.modules();
         let mut placed = Placed { system, places, values: &mut self.partials, evaluations: 0 };
-        let start = Start { pattern, y, rate, scale: &self.scale };
+        let start = Start { pattern, y, rate, scale: &self.scale, tolerance };
         let attempt = stages.attempt(&mut placed, &start, h);
         work.evaluations += placed.evaluations * modules;
         match attempt {
@@ -211,9 +211,8 @@ impl OneStep for Radau {
         }
     }
 
-    fn absolute_error(&self, _: &Workspace, step: Step<'_>, error: f64, _: f64) -> f64 {
-        let sizes = self.scale.iter().zip(step.y).map(|(scale, y)| scale / y.abs().max(1.0));
-        sizes.fold(0.0, |most, size| most.max(error * size))
+    fn absolute_error(&self, _: &Workspace, step: Step<'_>, _: f64, _: f64) -> f64 {
+        self.stages.as_ref().map_or(0.0, |stages| stages.absolute_error(step.y))
     }
 
     fn component_errors(&self) -> &[f64] {

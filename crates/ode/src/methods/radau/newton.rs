@@ -130,7 +130,7 @@ impl<const S: usize, const L: usize> Newton<S, L> {
     }
 
     pub fn attempt(&mut self, problem: &mut impl Stiff, start: &Start<'_>, h: f64) -> Attempt {
-        let Start { pattern, y, rate, scale } = *start;
+        let Start { pattern, y, rate, scale, .. } = *start;
         let n = pattern.unknowns();
         if y.len() != n || rate.len() != n || scale.len() != n || !h.is_finite() || h == 0.0 {
             return Attempt::NotFinite(None);
@@ -285,7 +285,7 @@ impl<const S: usize, const L: usize> Newton<S, L> {
 
     /// Simplified Newton iteration on the transformed increments (IV.8).
     fn iterate(&mut self, problem: &mut impl Stiff, start: &Start<'_>, rounding: f64) -> Iterations {
-        let Start { pattern, y, .. } = *start;
+        let Start { pattern, y, tolerance, .. } = *start;
         let (n, h, most) = (self.w.len(), self.h, 2 * S as u32 + 1);
         let kappa = KAPPA.max(rounding);
         let (mut last, mut last_ratio) = (0.0, 0.0);
@@ -322,6 +322,9 @@ impl<const S: usize, const L: usize> Newton<S, L> {
                     self.z[j * n + i] += d;
                     largest = if d.abs() > largest { d.abs() } else { largest };
                 }
+                if y[i].abs() < FLOOR {
+                    self.weigh_by_change(i, tolerance);
+                }
                 let share = largest * self.weight[i];
                 norm = if share > norm { share } else { norm };
             }
@@ -346,6 +349,19 @@ impl<const S: usize, const L: usize> Newton<S, L> {
             last = norm;
         }
         Err(Attempt::Diverged)
+    }
+
+    /// What was next to nothing, and is driven, errs relative to what it becomes in the step.
+    fn weigh_by_change(&mut self, component: usize, tolerance: f64) {
+        let changes = self.z.iter().skip(component).step_by(self.weight.len());
+        let most = changes.fold(0.0, |most: f64, z| most.max(z.abs()));
+        self.weight[component] = self.weight[component].min(1.0 / (tolerance * most));
+    }
+
+    /// See [`Stages::absolute_error`](super::stages::Stages::absolute_error).
+    pub fn absolute_error(&self, y: &[f64]) -> f64 {
+        let errors = self.errors.iter().zip(y).map(|([error], y)| error.abs() / y.abs().max(1.0));
+        errors.fold(0.0, f64::max)
     }
 
     /// Error of the embedded formula of order s, filtered by `(lambda_0 / h - J)^-1`, and filtered once more

@@ -36,6 +36,8 @@ pub struct Start<'a> {
     pub rate: &'a [f64],
     /// The error tolerated in each component, more than 0.
     pub scale: &'a [f64],
+    /// The relative error tolerated in what was next to nothing and is driven.
+    pub tolerance: f64,
 }
 
 /// Outcome of a step tried.
@@ -127,6 +129,11 @@ impl Stages {
     /// The estimated error of each component in the last attempt done, as a share of the allowed one.
     pub fn component_errors(&self) -> &[f64] {
         each!(self, newton => &newton.shares)
+    }
+
+    /// The largest estimated error of a component in the last attempt done, which began at `y`, relative to max(1, |value|).
+    pub fn absolute_error(&self, y: &[f64]) -> f64 {
+        each!(self, newton => newton.absolute_error(y))
     }
 
     /// Says that the next attempt continues at the end of the last one, if that was done.

@@ -49,7 +49,7 @@ fn integrate<R: Fn(f64, &[f64], &mut [f64]), J: Fn(f64, &[f64], &mut [f64])>(
         let mut factor = 0.5;
         let mut good = false;
         if let Attempt::Done { error, newton } =
-            radau.attempt(case, &Start { pattern, y, rate: &rate, scale: &scale }, step)
+            radau.attempt(case, &Start { pattern, y, rate: &rate, scale: &scale, tolerance: 0.0 }, step)
         {
             let most = 2.0 * stages as f64 + 1.0;
             let safety = 0.9 * (2.0 * most + 1.0) / (2.0 * most + f64::from(newton));
@@ -108,7 +108,7 @@ fn orders_are_five_and_nine() {
                 case.rates(0.0, &y, &mut rate);
                 let outcome = radau.attempt(
                     &mut case,
-                    &Start { pattern: &pattern, y: &y, rate: &rate, scale: &[1e-13; 2] },
+                    &Start { pattern: &pattern, y: &y, rate: &rate, scale: &[1e-13; 2], tolerance: 0.0 },
                     h,
                 );
                 assert!(matches!(outcome, Attempt::Done { .. }), "{outcome:?}");
@@ -257,7 +257,8 @@ fn linear_systems_take_one_solution_and_give_what_iteration_gives() {
                 // The second of 20 times the length of the first.
                 for h in [0.05, 1.0, 1.0] {
                     case.rates(0.0, &y, &mut rates);
-                    let start = Start { pattern: &pattern, y: &y, rate: &rates, scale: &[1e-8; 12] };
+                    let start =
+                        Start { pattern: &pattern, y: &y, rate: &rates, scale: &[1e-8; 12], tolerance: 0.0 };
                     let Attempt::Done { error, .. } = radau.attempt(&mut case, &start, h) else {
                         panic!("{couplings:?}")
                     };
@@ -292,7 +293,7 @@ fn the_defect_of_a_steady_linear_system_is_known_from_that_at_the_start() {
             let case = || Driven { form, couplings: [1.0, 1.0] };
             let (mut radau, y, mut rates) = (Stages::of(stages), vec![1.0; n], vec![0.0; n]);
             case().rates(0.0, &y, &mut rates);
-            let start = Start { pattern: &pattern, y: &y, rate: &rates, scale: &[1e-8; 12] };
+            let start = Start { pattern: &pattern, y: &y, rate: &rates, scale: &[1e-8; 12], tolerance: 0.0 };
             assert!(matches!(radau.attempt(&mut case(), &start, 2.0), Attempt::Done { .. }));
             let of = |tau: f64, y: &[f64], out: &mut [f64]| case().rates(tau, y, out);
             radau.interior_error(&pattern, Beginning { y: &y, rates: &rates, rough: &[] }, of)
@@ -313,7 +314,7 @@ fn dense_output_follows_the_solution() {
         let mut radau = Stages::of(stages);
         let done = radau.attempt(
             &mut case,
-            &Start { pattern: &pattern, y: &y, rate: &rate, scale: &[1e-9; 2] },
+            &Start { pattern: &pattern, y: &y, rate: &rate, scale: &[1e-9; 2], tolerance: 0.0 },
             0.3,
         );
         assert!(matches!(done, Attempt::Done { .. }));
@@ -338,7 +339,11 @@ fn invalid_input_is_reported_and_factors_are_reused() {
     let mut case =
         Case { time: 0.0, rates: decay, jacobian: |_: f64, _: &[f64], out: &mut [f64]| out[0] = -1.0 };
     let mut tried = |y: &[f64], rate: f64, h: f64| {
-        radau.attempt(&mut case, &Start { pattern: &pattern, y, rate: &[rate], scale: &[1e-9] }, h)
+        radau.attempt(
+            &mut case,
+            &Start { pattern: &pattern, y, rate: &[rate], scale: &[1e-9], tolerance: 0.0 },
+            h,
+        )
     };
     assert_eq!(tried(&[1.0], f64::NAN, 0.1), Attempt::NotFinite(Some(0)));
     assert_eq!(tried(&[1.0], -1.0, 0.0), Attempt::NotFinite(None));
@@ -348,7 +353,7 @@ fn invalid_input_is_reported_and_factors_are_reused() {
     for _ in 0..10 {
         let outcome = radau.attempt(
             &mut case,
-            &Start { pattern: &pattern, y: &y, rate: &[-y[0]], scale: &[1e-9] },
+            &Start { pattern: &pattern, y: &y, rate: &[-y[0]], scale: &[1e-9], tolerance: 0.0 },
             0.1,
         );
         assert!(matches!(outcome, Attempt::Done { error, .. } if error < 1.0), "{outcome:?}");
@@ -363,7 +368,7 @@ fn invalid_input_is_reported_and_factors_are_reused() {
         Case { time: 0.0, rates: square, jacobian: |_: f64, y: &[f64], out: &mut [f64]| out[0] = 2.0 * y[0] };
     let outcome = Stages::of(3).attempt(
         &mut case,
-        &Start { pattern: &pattern, y: &[1.0], rate: &[1.0], scale: &[1e-9] },
+        &Start { pattern: &pattern, y: &[1.0], rate: &[1.0], scale: &[1e-9], tolerance: 0.0 },
         3.0,
     );
     assert!(!matches!(outcome, Attempt::Done { error, .. } if error < 1.0), "{outcome:?}");

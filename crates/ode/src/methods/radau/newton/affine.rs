@@ -7,6 +7,7 @@
 use super::{Attempt, Iterations, Newton, pack, product, unpack};
 use crate::methods::radau::stages::{Start, Stiff};
 use crate::sparse::Field;
+use crate::workspace::FLOOR;
 
 /// A confirmed solution stands for steps that are so many times as long.
 const ALIKE: f64 = 8.0;
@@ -34,6 +35,9 @@ impl<const S: usize, const L: usize> Newton<S, L> {
         }
         if check != 0.0 {
             return Err(Attempt::NotFinite(self.z.iter().position(|z| !z.is_finite()).map(|i| i % n)));
+        }
+        for (component, _) in start.y.iter().enumerate().filter(|(_, y)| y.abs() < FLOOR) {
+            self.weigh_by_change(component, start.tolerance);
         }
         if h <= self.confirmed {
             return Ok(1);
