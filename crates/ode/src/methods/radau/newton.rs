@@ -314,7 +314,7 @@ impl<const S: usize, const L: usize> Newton<S, L> {
             }
             pattern.solve(&self.factors, &mut self.rhs);
             let mut norm = 0.0;
-            for i in 0..n {
+            for (i, before) in y.iter().enumerate() {
                 self.w[i] = self.w[i].add(self.rhs[i]);
                 let d = product(&self.table.vectors, &unpack::<S, L>(self.rhs[i]));
                 let mut largest = 0.0;
@@ -322,7 +322,7 @@ impl<const S: usize, const L: usize> Newton<S, L> {
                     self.z[j * n + i] += d;
                     largest = if d.abs() > largest { d.abs() } else { largest };
                 }
-                if y[i].abs() < FLOOR {
+                if before.abs() < FLOOR {
                     self.weigh_by_change(i, tolerance);
                 }
                 let share = largest * self.weight[i];
