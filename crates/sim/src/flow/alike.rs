@@ -92,6 +92,8 @@ struct Reading {
     parameters: u32,
     time: bool,
     age: bool,
+    /// It may have orbits: it is the only rule of its kind.
+    is_only: bool,
     /// Steps in a row that no other had been like.
     misses: u32,
 }
@@ -106,15 +108,18 @@ impl Reading {
 
 impl KnownSteps {
     pub fn new(model: &Model) -> KnownSteps {
-        let reading = |rule: &Rule, solve: &Solve| {
+        let several = model.kinds.iter().map(|(_, kind)| &kind.rules).filter(|rules| rules.len() > 1);
+        let mut is_only = vec![true; model.rules.len()];
+        several.flatten().for_each(|rule| is_only[*rule] = false);
+        let reading = |(rule, is_only): (&Rule, bool), solve: &Solve| {
             let both = [&solve.rates, &rule.sides].into_iter().flat_map(|program| program.reads());
             let own = both.clone().filter(|variable| **variable < rule.parameters.len().min(MOST_PARAMETERS));
             let parameters = own.fold(0, |all, parameter| all | 1 << parameter);
             let reads = |clock: usize| both.clone().any(|variable| *variable == rule.time_variable() + clock);
-            Reading { parameters, time: reads(0), age: reads(1), misses: 0 }
+            Reading { parameters, time: reads(0), age: reads(1), is_only, misses: 0 }
         };
-        let readings = (model.rules.iter())
-            .map(|rule| rule.solves.iter().map(|solve| reading(rule, solve)).collect())
+        let readings = (model.rules.iter().zip(is_only))
+            .map(|(rule, only)| rule.solves.iter().map(|solve| reading((rule, only), solve)).collect())
             .collect();
         KnownSteps { readings, ..KnownSteps::default() }
     }
@@ -133,6 +138,14 @@ impl KnownSteps {
     fn note_hit(&mut self) {
         let clause = self.now.words[0];
         self.readings[(clause >> 32) as usize][clause as u32 as usize].misses = 0;
+    }
+
+    /// Notes that modules that are like the present one, which has a value, do not run along its orbit at an instant.
+    fn note_own(&mut self, x: f64, from: SimTime) {
+        let KnownSteps { orbits, orbit, now, .. } = self;
+        if let Some(Rests { hash, words, .. }) = *orbit {
+            orbits.note_own((hash, &now.words[..words]), x, from);
+        }
     }
 
     /// Hashes all that the present module's step depends on.
@@ -190,20 +203,21 @@ impl FlowStage<'_, '_> {
         let Some(orbit) = self.stand(id, from, experience) else {
             return Ok(Followed::Alone { is_kept: false, accuracy: 1.0 });
         };
-        let accuracy = match orbit.map(|x| self.along_orbit(x, from)) {
-            Some(Ok(onward)) => {
-                self.flows.known_steps.note_hit();
-                self.follow(id, from, onward)?;
-                return Ok(Followed::Alike);
-            }
-            Some(Err(accuracy)) => accuracy,
-            None => 1.0,
-        };
         self.stand_exactly(id, from, experience);
         let Some(known) = self.flows.known_steps.get() else {
-            return Ok(Followed::Alone { is_kept: true, accuracy });
+            let Some(x) = orbit else { return Ok(Followed::Alone { is_kept: true, accuracy: 1.0 }) };
+            return match self.along_orbit(x, from) {
+                Ok(onward) => {
+                    self.flows.known_steps.note_hit();
+                    self.follow(id, from, onward).map(|()| Followed::Alike)
+                }
+                Err(accuracy) => Ok(Followed::Alone { is_kept: true, accuracy }),
+            };
         };
         self.flows.known_steps.note_hit();
+        if let Some(x) = orbit {
+            self.flows.known_steps.note_own(x, from);
+        }
         // Steps of one standing at one instant are the same to the last bit.
         let start = known.made.dense.start;
         let moved = |time: SimTime| if from == start { time } else { from.after(time.since(start)) };
@@ -240,12 +254,10 @@ impl FlowStage<'_, '_> {
         let is_plain = matches!(state.next.kind, NextKind::Event | NextKind::Window);
         let Some(step) = state.trajectories.step().filter(|_| is_plain) else { return };
         let KnownSteps { orbits, orbit, now, .. } = &mut self.flows.known_steps;
-        let is_kept = orbit.is_some_and(|Rests { hash, words, error }| {
-            orbits.keep((hash, &now.words[..words]), step, (&state.next, at), error)
-        });
-        if !is_kept {
-            self.flows.known_steps.keep(step, &state.next, at);
+        if let Some(Rests { hash, words, error }) = *orbit {
+            orbits.keep((hash, &now.words[..words]), step, (&state.next, at), error);
         }
+        self.flows.known_steps.keep(step, &state.next, at);
     }
 
     /// Notes how a module stands before a step, as far as it rests. None if its steps depend on anything else; then the value of its only
@@ -260,17 +272,19 @@ impl FlowStage<'_, '_> {
         }
         let KnownSteps { readings, now: Standing { words, .. }, orbit, .. } = &mut self.flows.known_steps;
         let reading = &mut readings[index][solve];
-        if !reading.is_worth() {
+        let is_worth = reading.is_worth();
+        let Reading { parameters, time, age, is_only, .. } = &*reading;
+        let is_timed = *time || self.setup.settings.method.is_fixed_step();
+        let may_have_orbit = *is_only && !is_timed && !*age && state.next.near() == 0;
+        if !is_worth && !may_have_orbit {
             return None;
         }
-        let Reading { parameters, time, age, .. } = &*reading;
-        let is_timed = *time || self.setup.settings.method.is_fixed_step();
         words.clear();
         words.push((index as u64) << 32 | solve as u64);
         words.push((tree.kind(id).index() as u64) << 1 | u64::from(state.numeric_only));
         let [high, _] = from.bits();
         words.push(high >> (f64::MANTISSA_DIGITS - 1));
-        let (mut moving, mut others) = (None, is_timed || *age || state.next.near() != 0);
+        let (mut moving, mut others) = (None, !may_have_orbit);
         for (parameter, value) in values.iter().enumerate() {
             match state.trajectories.get(parameter) {
                 None | Some(Law::Rest) if parameters & 1 << parameter != 0 => words.push(value.to_bits()),
@@ -282,6 +296,9 @@ impl FlowStage<'_, '_> {
         words.extend(state.marks.signs().iter().map(|sign| *sign as u64));
         words.extend(state.marks.switches().iter().map(|on| u64::from(*on)));
         let x = moving.filter(|_| !others);
+        if !is_worth && x.is_none() {
+            return None;
+        }
         let (words, error) = (&words[..], experience.control.error);
         *orbit = x.map(|_| Rests { hash: hash_of(words), words: words.len(), error });
         Some(x)

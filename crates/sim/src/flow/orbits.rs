@@ -9,7 +9,13 @@
 //! accurately, once a second life comes by with another value; and a life begins only where the rate is not much smaller than later in the
 //! step, or at its start, because that error grows as rates do.
 
+//!
+//! Which steps are kept is a matter of what came before. Modules with one rule and one value take the same step at one instant all the same, so that
+//! their events are one instant; those of a kind with several rules have no orbits, because a module under another rule would take another step.
+
 use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
 
 use crate::flow::independent::Made;
 use crate::flow::integrator::CERTAINTY;
@@ -55,6 +61,54 @@ struct Orbit {
     pieces: Vec<Arc<Piece>>,
     /// Lives with different values have come by.
     is_shared: bool,
+    now: Answers,
+}
+
+/// What has been found at one instant, by value: modules that are alike take the same step then, whatever others have added in between.
+#[derive(Clone, Debug, Default)]
+struct Answers {
+    instant: [u64; 2],
+    /// None for a step of their own.
+    pieces: FxHashMap<u64, Option<Arc<Piece>>>,
+}
+
+impl Answers {
+    /// Those at an instant.
+    fn at(&mut self, instant: SimTime) -> &mut FxHashMap<u64, Option<Arc<Piece>>> {
+        if self.instant != instant.bits() {
+            self.instant = instant.bits();
+            self.pieces.clear();
+        }
+        &mut self.pieces
+    }
+}
+
+impl Orbit {
+    /// Becomes that of other equations.
+    fn begin(&mut self, standing: &[u64]) {
+        self.standing.clear();
+        self.standing.extend_from_slice(standing);
+        self.pieces.clear();
+        self.now.pieces.clear();
+        self.is_shared = false;
+    }
+
+    /// The part of the tolerance with which a module makes a step of its own.
+    fn accuracy(&self) -> f64 {
+        if self.is_shared { SHARED_TOLERANCE } else { 1.0 }
+    }
+
+    /// The longest piece that leads on from a value.
+    fn longest(&self, x: f64) -> Option<&Arc<Piece>> {
+        let (mut longest, mut leads) = (None, 0.0);
+        for piece in &self.pieces {
+            let rest = piece.leads(x);
+            if rest > leads {
+                (longest, leads) = (Some(piece), rest);
+            }
+        }
+        longest
+    }
 }
 
 /// Orbits, by the hash of what they depend on. One takes the place of another of the same hash.
@@ -72,9 +126,14 @@ pub struct Onward {
 }
 
 impl Piece {
+    /// True for the value of its start, but for what rounding does to the end of the step before.
+    fn starts_at(&self, x: f64) -> bool {
+        (x - self.start).abs() <= 4.0 * f64::EPSILON * self.start.abs()
+    }
+
     /// How far it leads from a value on; 0 if it does not.
     fn leads(&self, x: f64) -> f64 {
-        let within = x == self.start || (x - self.from) * (self.to - x) > 0.0 || x == self.from;
+        let within = self.starts_at(x) || (x - self.from) * (self.to - x) > 0.0 || x == self.from;
         let rest = (self.to - x).abs();
         if within && rest > LEAST_REST * (self.to - self.start).abs() { rest } else { 0.0 }
     }
@@ -83,7 +142,8 @@ impl Piece {
     fn onward(&self, x: f64, module: Traveller) -> Option<Onward> {
         let Traveller { from, error, tolerance } = module;
         let known = &self.made.dense;
-        let (mut dense, before) = match x == self.start {
+        let (mut dense, before) = match self.starts_at(x) {
+            true if x != self.start => (known.rest(0.0, from, x), 0.0),
             true => {
                 let mut dense = known.clone();
                 dense.start = from;
@@ -127,58 +187,62 @@ impl Orbits {
     ) -> Result<Onward, f64> {
         let orbit = self.places.get_mut(Orbits::place(hash)).filter(|orbit| orbit.standing == standing);
         let Some(orbit) = orbit else { return Err(1.0) };
-        let (mut longest, mut leads) = (None, 0.0);
-        for piece in &orbit.pieces {
-            let rest = piece.leads(x);
-            if rest > leads {
-                (longest, leads) = (Some(piece), rest);
-            }
+        if let Some(answer) = orbit.now.at(module.from).get(&x.to_bits()) {
+            let onward = answer.as_ref().and_then(|piece| piece.onward(x, module));
+            return onward.ok_or(orbit.accuracy());
         }
-        let own = if orbit.is_shared { SHARED_TOLERANCE } else { 1.0 };
-        match longest {
-            Some(piece) if orbit.is_shared || x == piece.start => piece.onward(x, module).ok_or(own),
-            Some(_) => {
-                orbit.pieces.clear();
-                orbit.is_shared = true;
-                Err(SHARED_TOLERANCE)
-            }
-            None => Err(own),
+        let piece = orbit.longest(x).cloned();
+        let begins_within = piece.as_ref().is_some_and(|piece| !piece.starts_at(x));
+        if begins_within && !orbit.is_shared {
+            orbit.pieces.clear();
+            orbit.is_shared = true;
+        } else if let Some(onward) = piece.as_ref().and_then(|piece| piece.onward(x, module)) {
+            orbit.now.pieces.insert(x.to_bits(), piece);
+            return Ok(onward);
+        }
+        orbit.now.pieces.insert(x.to_bits(), None);
+        Err(orbit.accuracy())
+    }
+
+    /// Notes that modules with a value have a step from elsewhere at an instant.
+    pub fn note_own(&mut self, (hash, standing): (u64, &[u64]), x: f64, from: SimTime) {
+        let orbit = self.places.get_mut(Orbits::place(hash)).filter(|orbit| orbit.standing == standing);
+        if let Some(orbit) = orbit {
+            orbit.now.at(from).entry(x.to_bits()).or_insert(None);
         }
     }
 
-    /// Keeps the step of a module, which had an error before it. False if it is none that others can take.
+    /// Keeps the step of a module, which had an error before it, if others can take it.
     pub fn keep(
         &mut self,
         (hash, standing): (u64, &[u64]),
         step: &Step,
         (next, at): (&Next, SimTime),
         error: f64,
-    ) -> bool {
+    ) {
         let is_plain = matches!(next.kind, NextKind::Event | NextKind::Window);
-        let Some(from) = begins(&step.dense) else { return false };
+        let Some(from) = begins(&step.dense) else { return };
         if !is_plain || !next.changes().is_empty() || next.near() != 0 {
-            return false;
+            return;
         }
         if self.places.is_empty() {
             self.places.resize(PLACES, Orbit::default());
         }
         let orbit = &mut self.places[Orbits::place(hash)];
         if orbit.standing != standing {
-            orbit.standing.clear();
-            orbit.standing.extend_from_slice(standing);
-            orbit.pieces.clear();
-            orbit.is_shared = false;
+            orbit.begin(standing);
         }
         if orbit.pieces.len() == MOST_PIECES {
-            return false;
+            return;
         }
         let Step { dense, control, number, hurdle, .. } = step;
         let made = Made { dense: dense.clone(), control: *control, number: *number, hurdle: *hurdle };
         let end = if next.kind == NextKind::Event { dense.position(at) } else { 1.0 };
         let (start, to) = (dense.value_or_end(0, 0.0), dense.value_or_end(0, end));
         let added = (control.error - error).max(0.0);
-        orbit.pieces.push(Arc::new(Piece { from, to, start, made, added, next: next.clone(), at }));
-        true
+        let piece = Arc::new(Piece { from, to, start, made, added, next: next.clone(), at });
+        orbit.now.at(dense.start).insert(start.to_bits(), Some(piece.clone()));
+        orbit.pieces.push(piece);
     }
 }
 
