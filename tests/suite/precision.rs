@@ -322,12 +322,12 @@ fn differences_of_large_numbers_meet_their_levels() {
 
 #[test]
 fn what_jumps_over_a_level_does_not_meet_it() {
-    let text = "initial string: A(0, 0) C(0) D(0) Q(1, 0.34) R(0.34) T(1, 0.34)\nA(x, v):\n solve dx/dt = 1, v = 2*floor(x)\n if v = 3 produce B\nC(x):\n solve dx/dt = 1\n if 2*floor(x) = 3 produce B\nQ(x, n):\n solve dx/dt = 1, dn/dt = -0.3\n if x/n = 0.5 produce B\nR(n):\n solve dn/dt = -0.3\n if 1/n = -0.05 produce B\nT(x, n):\n solve dx/dt = 1, dn/dt = -0.3\n if atan(x/n) = 0.35 & n < 0.1 produce B\nD(x):\n solve dx/dt = cos(x)\n if 1/(x - 0.5) = 0 produce B\nB: if t < 0 produce ε";
+    let text = "initial string: A(0, 0) C(0) D(0) Q(1, 0.34) T(1, 0.34)\nA(x, v):\n solve dx/dt = 1, v = 2*floor(x)\n if v = 3 produce B\nC(x):\n solve dx/dt = 1\n if 2*floor(x) = 3 produce B\nQ(x, n):\n solve dx/dt = 1, dn/dt = -0.3\n if x/n = 0.5 produce B\nT(x, n):\n solve dx/dt = 1, dn/dt = -0.3\n if atan(x/n) = 0.35 & n < 0.1 produce B\nD(x):\n solve dx/dt = cos(x)\n if 1/(x - 0.5) = 0 produce B\nB: if t < 0 produce ε";
     for method in [Method::Auto, Method::Radau] {
         let settings = Settings { method, ..Settings::default() };
         let strings = run(text, settings, &[1.0, 2.0, 5.0]).expect("runs");
         let names: Vec<&str> = strings.iter().flatten().map(|(name, _)| &**name).collect();
-        assert_eq!(names, ["A", "C", "D", "Q", "R", "T"].repeat(3), "{method:?}");
+        assert_eq!(names, ["A", "C", "D", "Q", "T"].repeat(3), "{method:?}");
     }
 }
 
