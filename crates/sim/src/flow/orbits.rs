@@ -8,7 +8,6 @@
 //! The point where a life begins is found by the step's dense output, and its error adds to that of the life. So steps are made anew and more
 //! accurately, once a second life comes by with another value; and a life begins only where the rate is not much smaller than later in the
 //! step, or at its start, because that error grows as rates do.
-
 //!
 //! Which steps are kept is a matter of what came before. Modules with one rule and one value take the same step at one instant all the same, so that
 //! their events are one instant; those of a kind with several rules have no orbits, because a module under another rule would take another step.
@@ -68,13 +67,13 @@ struct Orbit {
 #[derive(Clone, Debug, Default)]
 struct Answers {
     instant: [u64; 2],
-    /// None for a step of their own.
-    pieces: FxHashMap<u64, Option<Arc<Piece>>>,
+    /// The part of the tolerance for a step of their own.
+    pieces: FxHashMap<u64, Result<Arc<Piece>, f64>>,
 }
 
 impl Answers {
     /// Those at an instant.
-    fn at(&mut self, instant: SimTime) -> &mut FxHashMap<u64, Option<Arc<Piece>>> {
+    fn at(&mut self, instant: SimTime) -> &mut FxHashMap<u64, Result<Arc<Piece>, f64>> {
         if self.instant != instant.bits() {
             self.instant = instant.bits();
             self.pieces.clear();
@@ -188,27 +187,32 @@ impl Orbits {
         let orbit = self.places.get_mut(Orbits::place(hash)).filter(|orbit| orbit.standing == standing);
         let Some(orbit) = orbit else { return Err(1.0) };
         if let Some(answer) = orbit.now.at(module.from).get(&x.to_bits()) {
-            let onward = answer.as_ref().and_then(|piece| piece.onward(x, module));
-            return onward.ok_or(orbit.accuracy());
+            return match answer {
+                Ok(piece) => piece.onward(x, module).ok_or(1.0),
+                Err(accuracy) => Err(*accuracy),
+            };
         }
         let piece = orbit.longest(x).cloned();
         let begins_within = piece.as_ref().is_some_and(|piece| !piece.starts_at(x));
         if begins_within && !orbit.is_shared {
             orbit.pieces.clear();
             orbit.is_shared = true;
-        } else if let Some(onward) = piece.as_ref().and_then(|piece| piece.onward(x, module)) {
-            orbit.now.pieces.insert(x.to_bits(), piece);
+        } else if let Some(piece) = piece
+            && let Some(onward) = piece.onward(x, module)
+        {
+            orbit.now.pieces.insert(x.to_bits(), Ok(piece));
             return Ok(onward);
         }
-        orbit.now.pieces.insert(x.to_bits(), None);
-        Err(orbit.accuracy())
+        let accuracy = orbit.accuracy();
+        orbit.now.pieces.insert(x.to_bits(), Err(accuracy));
+        Err(accuracy)
     }
 
     /// Notes that modules with a value have a step from elsewhere at an instant.
     pub fn note_own(&mut self, (hash, standing): (u64, &[u64]), x: f64, from: SimTime) {
         let orbit = self.places.get_mut(Orbits::place(hash)).filter(|orbit| orbit.standing == standing);
         if let Some(orbit) = orbit {
-            orbit.now.at(from).entry(x.to_bits()).or_insert(None);
+            orbit.now.at(from).entry(x.to_bits()).or_insert(Err(1.0));
         }
     }
 
@@ -241,7 +245,7 @@ impl Orbits {
         let (start, to) = (dense.value_or_end(0, 0.0), dense.value_or_end(0, end));
         let added = (control.error - error).max(0.0);
         let piece = Arc::new(Piece { from, to, start, made, added, next: next.clone(), at });
-        orbit.now.at(dense.start).insert(start.to_bits(), Some(piece.clone()));
+        orbit.now.at(dense.start).insert(start.to_bits(), Ok(piece.clone()));
         orbit.pieces.push(piece);
     }
 }
