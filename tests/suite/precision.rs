@@ -322,12 +322,12 @@ fn differences_of_large_numbers_meet_their_levels() {
 
 #[test]
 fn what_jumps_over_a_level_does_not_meet_it() {
-    let text = "initial string: A(0, 0) C(0) D(0) Q(1, 0.34) T(1, 0.34)\nA(x, v):\n solve dx/dt = 1, v = 2*floor(x)\n if v = 3 produce B\nC(x):\n solve dx/dt = 1\n if 2*floor(x) = 3 produce B\nQ(x, n):\n solve dx/dt = 1, dn/dt = -0.3\n if x/n = 0.5 produce B\nT(x, n):\n solve dx/dt = 1, dn/dt = -0.3\n if atan(x/n) = 0.35 & n < 0.1 produce B\nD(x):\n solve dx/dt = cos(x)\n if 1/(x - 0.5) = 0 produce B\nB: if t < 0 produce ε";
+    let text = "initial string: A(0, 0) C(0) D(0) Q(1, 0.34) R(1) T(1, 0.34)\nA(x, v):\n solve dx/dt = 1, v = 2*floor(x)\n if v = 3 produce B\nC(x):\n solve dx/dt = 1\n if 2*floor(x) = 3 produce B\nQ(x, n):\n solve dx/dt = 1, dn/dt = -0.3\n if x/n = 0.5 produce B\nR(n):\n solve dn/dt = -0.3\n if 1/n = -0.5 produce B\nT(x, n):\n solve dx/dt = 1, dn/dt = -0.3\n if atan(x/n) = 0.35 & n < 0.1 produce B\nD(x):\n solve dx/dt = cos(x)\n if 1/(x - 0.5) = 0 produce B\nB: if t < 0 produce ε";
     for method in [Method::Auto, Method::Radau] {
         let settings = Settings { method, ..Settings::default() };
         let strings = run(text, settings, &[1.0, 2.0, 5.0]).expect("runs");
         let names: Vec<&str> = strings.iter().flatten().map(|(name, _)| &**name).collect();
-        assert_eq!(names, ["A", "C", "D", "Q", "T"].repeat(3), "{method:?}");
+        assert_eq!(names, ["A", "C", "D", "Q", "R", "T"].repeat(3), "{method:?}");
     }
 }
 
@@ -373,8 +373,10 @@ fn what_has_decayed_to_nothing_is_driven_anew() {
 /// Of what has not arrived anywhere nobody knows which of two is larger: that switches nothing, and is no event.
 #[test]
 fn a_row_of_empty_cells_is_filled_from_one_end() {
-    for rate in ["max(c_l - c, 0)", "abs(c_l - c)", "c_l - c"] {
-        for (cells, production) in [(8, ""), (24, "\n if c_l < c produce X\nX: if t < 0 produce ε")] {
+    for rate in ["max(c_l - c, 0)", "abs(c_l - c)", "c_l - c", "if c_l > c then c_l - c else 0"] {
+        let production =
+            if rate.starts_with("if") { "" } else { "\n if c_l < c produce X\nX: if t < 0 produce ε" };
+        for (cells, production) in [(8, ""), (24, production)] {
             let row = "A(0) ".repeat(cells);
             let first = rate.replace("c_l", "s");
             let text = format!(
@@ -397,6 +399,38 @@ fn a_row_of_empty_cells_is_filled_from_one_end() {
                         "{method:?} {tolerance:e} {number}: {name}{values:?}, not {wanted}\n{text}"
                     );
                 }
+            }
+        }
+    }
+}
+
+/// An implicit step is a polynomial through later values: it departs at once from what stays empty much longer.
+#[test]
+fn a_row_of_empty_cells_is_filled_in_implicit_steps() {
+    for rate in [
+        "max(r - c, 0) + c*(0.94 - c)",
+        "max(l - c, 0) + 0.7*max(r - c, 0) - c^3",
+        "abs(l - c) + abs(r - c) + c/(1 + c)",
+        "(if l > c then l - c else 0) + 0.5*sin(c)",
+    ] {
+        let text = format!(
+            "initial string: W(0.3) {} W(0.9)\nW(l) < A(c) > A(r): solve dc/dt = {rate}\nA(l) < A(c) > A(r): solve dc/dt = {rate}\nA(l) < A(c) > W(r): solve dc/dt = {rate}",
+            "A(0) ".repeat(6)
+        );
+        let states = |method, tolerance| {
+            let settings = Settings { method, tolerance, ..Settings::default() };
+            run(&text, settings, &[0.5, 2.0])
+                .unwrap_or_else(|e| panic!("{method:?} {tolerance:e}: {e}\n{text}"))
+        };
+        let exact = states(Method::Dop853, 1e-11);
+        for (method, tolerance) in [Method::Radau, Method::Auto]
+            .into_iter()
+            .flat_map(|m| [1e-3, 1e-4, 1e-6, 1e-8].map(|tol| (m, tol)))
+        {
+            let found = states(method, tolerance);
+            for ((_, a), (_, b)) in found.iter().flatten().zip(exact.iter().flatten()) {
+                let error = (a[0] - b[0]).abs();
+                assert!(error < 30.0 * tolerance, "{method:?} {tolerance:e}: {error:e}\n{text}");
             }
         }
     }

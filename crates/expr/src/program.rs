@@ -378,6 +378,20 @@ impl Program {
         })
     }
 
+    /// True if all roots are defined for all numbers, though they may jump: there are no operations with edges, poles or gaps.
+    pub fn is_total(&self) -> bool {
+        self.0.code.iter().all(|instruction| match *instruction {
+            Instruction::Unary(op, ..) => !op.is_partial() && op != Unary::Tan,
+            Instruction::Binary(op, ..) | Instruction::Left(op, ..) => {
+                !matches!(op, Binary::Div | Binary::Pow)
+            }
+            Instruction::Right(Binary::Pow, .., exponent) => exponent >= 0.0 && exponent.fract() == 0.0,
+            Instruction::Curve(_, part, ..) | Instruction::Piece(_, part, ..) => part != Part::Inverse,
+            Instruction::Element(..) | Instruction::Field(..) => false,
+            _ => true,
+        })
+    }
+
     /// The variables that some operands of the instructions depend on, ascending.
     fn reads_through(&self, operands: impl Fn(&Instruction) -> [Option<Register>; 2]) -> Vec<usize> {
         let mut all: BTreeSet<Register> = BTreeSet::new();

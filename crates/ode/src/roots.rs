@@ -32,6 +32,10 @@ pub trait Function {
     fn bounds(&mut self, lo: f64, hi: f64) -> Dual<Interval>;
     /// The value at a position; NaN where it is undefined.
     fn value(&mut self, at: f64) -> f64;
+    /// True if it is known to be defined everywhere. It may jump all the same.
+    fn is_total(&self) -> bool {
+        false
+    }
     /// The length of a part of the step within which the function does not vary often.
     fn stretch(&self) -> f64 {
         f64::INFINITY
@@ -51,7 +55,7 @@ pub struct Root {
 
 /// Finds the first root in `(from, to]`; see the contract above.
 pub fn first_root(f: &mut impl Function, from: f64, to: f64, start: Sign, tolerance: f64) -> Option<Root> {
-    let mut search = Search { f, to, tolerance, sign: start, armed: false };
+    let mut search = Search { f, to, tolerance, sign: start, armed: false, total: None };
     let first = search.sign_at(from);
     if first != Sign::Zero && search.sign == Sign::Any {
         search.sign = first;
@@ -95,6 +99,8 @@ struct Search<'f, F> {
     sign: Sign,
     /// The function was off zero somewhere up to here.
     armed: bool,
+    /// The function is known to be defined everywhere, once that has been asked.
+    total: Option<bool>,
 }
 
 /// The result of a look at a stretch.
@@ -109,6 +115,10 @@ enum Finding {
 impl<F: Function> Search<'_, F> {
     fn classify(&self, g: f64) -> Sign {
         if g.abs() <= self.tolerance { Sign::Zero } else { Sign::of(g) }
+    }
+
+    fn is_total(&mut self) -> bool {
+        *self.total.get_or_insert_with(|| self.f.is_total())
     }
 
     fn sign_at(&mut self, at: f64) -> Sign {
@@ -140,7 +150,8 @@ impl<F: Function> Search<'_, F> {
             Sign::Zero | Sign::Any => g.magnitude() <= tolerance,
             Sign::Undefined => false,
         };
-        if settled && !g.partial {
+        // What jumps without meeting zero is no root, as far as it is defined.
+        if settled && (!g.partial || self.is_total()) {
             self.armed |= matches!(sign, Sign::Plus | Sign::Minus);
             return Finding::Nothing;
         }
@@ -153,8 +164,8 @@ impl<F: Function> Search<'_, F> {
         let found = if !self.armed {
             self.leave_zero(lo, hi, end)
         } else {
-            let steepest = monotone.then(|| rate.magnitude());
-            match self.jumped(lo).or_else(|| self.crossing(lo, hi, end, steepest)) {
+            let monotone_rate = monotone.then_some(rate);
+            match self.jumped(lo).or_else(|| self.crossing(lo, hi, end, monotone_rate)) {
                 None if monotone => None,
                 None if last => self.judge(lo, hi),
                 None => self.touch(lo, hi, end),
@@ -172,10 +183,9 @@ impl<F: Function> Search<'_, F> {
         jumps.then_some(Root { position: lo, at: there, after: there })
     }
 
-    /// A change of sign in a stretch that is narrow, or monotone with a rate of no more than `steepest`, and has the sign `end` at its
-    /// end.
-    fn crossing(&mut self, lo: f64, hi: f64, end: Sign, steepest: Option<f64>) -> Option<Root> {
-        let (sign, monotone) = (self.sign, steepest.is_some());
+    /// A change of sign in a stretch that is narrow, or monotone with a `rate` of one sign, and has the sign `end` at its end.
+    fn crossing(&mut self, lo: f64, hi: f64, end: Sign, rate: Option<Interval>) -> Option<Root> {
+        let (sign, monotone) = (self.sign, rate.is_some());
         // Exactly: a value that merely comes within the tolerance may be about to cross.
         let exact = Sign::of(self.f.value(hi));
         // At the very end of the stretch, if it is about to cross within the rounding of the position.
@@ -192,8 +202,12 @@ impl<F: Function> Search<'_, F> {
         }
         let position = bracket(self.f, lo, hi, sign);
         // It jumps where its bounds say that it does not, as above.
-        let step = match steepest {
-            Some(rate) if rate.is_finite() => 16.0 * f64::EPSILON * hi * rate,
+        let step = match rate {
+            // What moves away from zero and is on its other side then has been through infinity.
+            Some(rate) if (sign == Sign::Plus && rate.lo > 0.0) || (sign == Sign::Minus && rate.hi < 0.0) => {
+                0.0
+            }
+            Some(rate) if rate.magnitude().is_finite() => 16.0 * f64::EPSILON * hi * rate.magnitude(),
             // Through infinity, or as steep as that.
             Some(_) => 0.0,
             None => f64::INFINITY,

@@ -69,6 +69,18 @@ fn a_touch_is_found_once_and_a_near_miss_is_not() {
 }
 
 #[test]
+fn what_passes_through_infinity_does_not_meet_zero() {
+    // 1/(0.3 - x) + 0.5 rises to infinity, and comes back from below.
+    let mut f = given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, _: fn(Unary, T) -> T| {
+        op(Binary::Add, op(Binary::Div, c(1.0), op(Binary::Sub, c(0.3), x)), c(0.5))
+    });
+    for to in [1.0, 0.3, 0.3 + 1e-16] {
+        let root = first_root(&mut f, 0.0, to, Sign::Plus, 1e-15);
+        assert!(root.is_none_or(|root| root.at != Sign::Zero), "up to {to}: {root:?}");
+    }
+}
+
+#[test]
 fn what_ends_on_zero_to_the_last_bit_has_not_crossed_it() {
     // 1 - sin(x) is 0 in numbers within 1e-8 of its touch.
     let mut f = given!(x => |c: fn(f64) -> T, op: fn(Binary, T, T) -> T, un: fn(Unary, T) -> T| {

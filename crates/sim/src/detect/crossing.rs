@@ -113,6 +113,11 @@ impl Function for Difference<'_, '_> {
         m.out[2 * self.atom] - m.out[2 * self.atom + 1]
     }
 
+    fn is_total(&self) -> bool {
+        let reads = &self.path.rule.atom_reads[self.atom];
+        self.sides.is_total() && reads.iter().all(|variable| self.path.is_total(*variable))
+    }
+
     fn stretch(&self) -> f64 {
         self.path.world.stretch / self.path.h
     }
@@ -267,10 +272,17 @@ impl CrossingDetector {
                 tolerance = tolerance.max(noise).max(self.rounding(path, atom, from));
             }
         }
-        if matches!(sign, Sign::Zero | Sign::Any) && path.reads_others() && path.error() > 0.0 {
-            tolerance = tolerance.max(self.least_noise(path, atom, from));
+        // Inside equations a sign may be that of noise: which of them are taken next to nothing does not count.
+        let is_noise = |noise: f64| {
+            matches!(sign, Sign::Zero | Sign::Any)
+                || start.abs() <= noise && !path.rule.decides_productions(atom)
+        };
+        let is_among_others = path.reads_others() && path.error() > 0.0;
+        if is_among_others && start.abs() < path.error() {
+            let noise = self.least_noise(path, atom, from);
+            tolerance = if is_noise(noise) { tolerance.max(noise) } else { tolerance };
         }
-        let Root { position, mut at, mut after } = loop {
+        let Root { mut position, mut at, mut after } = loop {
             let root = match LevelDifference::new(path, atom) {
                 Some(mut plain) => first_root(&mut plain, from, limit, sign, tolerance),
                 None => first_root(&mut self.difference(path, atom), from, limit, sign, tolerance),
@@ -281,6 +293,9 @@ impl CrossingDetector {
                 None => break root,
             }
         };
+        if is_among_others && position == from && at == Sign::Zero && start.abs() <= tolerance {
+            position = self.way_out(path, atom, (from, limit), tolerance);
+        }
         if at == after && after == opposite(sign) && self.passes_by_rounding(path, atom, position) {
             at = Sign::Zero;
         }
@@ -296,6 +311,16 @@ impl CrossingDetector {
         let passes = at == Sign::Zero && after != sign;
         let level = if passes { self.level_of(path, atom) } else { None };
         Some(Crossing { position, time, at, after, level })
+    }
+
+    /// The place at which a difference that leaves zero at the beginning of a stretch has left it: an output that is a polynomial through
+    /// later values departs at once from what stays zero longer. At the instant itself nothing tells that it is not zero any more.
+    fn way_out(&mut self, path: &Path, atom: usize, (from, limit): (f64, f64), tolerance: f64) -> f64 {
+        let (mut reach, least) = (limit - from, 4.0 * path.start.resolution() / path.h);
+        while reach > least && self.difference(path, atom).value(from + 0.5 * reach).abs() > tolerance {
+            reach *= 0.5;
+        }
+        from + reach
     }
 
     /// The parameter of the module, or of a neighbour, or the time, whose value the condition of a production compares with a level that rests, and the level.

@@ -97,6 +97,10 @@ impl<F: Function> Function for Raised<'_, F> {
         self.0.value(at) + self.1
     }
 
+    fn is_total(&self) -> bool {
+        self.0.is_total()
+    }
+
     fn stretch(&self) -> f64 {
         self.0.stretch()
     }

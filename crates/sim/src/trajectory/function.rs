@@ -50,6 +50,11 @@ impl FunctionOfTime {
         out[0]
     }
 
+    /// True if it is defined at all times.
+    pub fn is_total(&self) -> bool {
+        self.program.is_total() && self.moving.iter().all(|(_, trajectory)| trajectory.is_total())
+    }
+
     /// The value itself at a time since the start.
     pub fn at(&self, tau: f64) -> f64 {
         let time = [self.variables[self.time] + tau, self.variables[self.time + 1] + tau];

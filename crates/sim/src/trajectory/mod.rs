@@ -59,6 +59,16 @@ impl Trajectory {
         matches!(self, Trajectory::Function(function) if !function.begins_at(x))
     }
 
+    /// True if it is known to be defined at all times: others may end at a pole.
+    pub fn is_total(&self) -> bool {
+        match self {
+            Trajectory::Function(function) => function.is_total(),
+            Trajectory::Riccati(law) => law.exponential().is_some(),
+            Trajectory::Driven(_) => false,
+            _ => true,
+        }
+    }
+
     /// Bounds of value and rate from one time since the start, at which the value was `x`, to another; unbounded for dense output.
     #[inline]
     pub fn within(&self, x: f64, from: f64, to: f64) -> Dual<Interval> {

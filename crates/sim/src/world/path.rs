@@ -307,6 +307,15 @@ impl<'p> Path<'p> {
         self.law_of(variable).is_some_and(|law| matches!(law, Law::Formula(Trajectory::Function(_))))
     }
 
+    /// True for a variable that is defined at all times of the path: what a function of time reads may end. Of aggregates nothing is known.
+    pub fn is_total(&self, variable: usize) -> bool {
+        match self.law_of(variable) {
+            Some(Law::Formula(trajectory)) => trajectory.is_total(),
+            Some(_) => true,
+            None => variable < self.rule.first_aggregate,
+        }
+    }
+
     /// False for a variable that is a parameter at rest.
     pub fn moves(&self, variable: usize) -> bool {
         let rests = self.law_of(variable).is_none_or(|law| matches!(law, Law::Rest));
