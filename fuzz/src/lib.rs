@@ -1,4 +1,7 @@
-//! The fuzz targets: each accepts any bytes, and must neither panic nor hang.
+//! The fuzz targets: each accepts any bytes, and must neither panic nor hang. Beside them random models whose results are known
+//! ([`accuracy`]).
+
+pub mod accuracy;
 
 use std::path::Path;
 

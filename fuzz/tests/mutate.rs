@@ -1,8 +1,11 @@
-//! The runner on a few inputs of each target: as many as take some seconds. `.ci/run` gives it a minute.
+//! The runner on a few inputs of each target, and a few models with known results: as many as take some seconds. `.ci/run` gives them a
+//! minute.
 
 use std::process::Command;
 
+use dlsys::sim::Method;
 use dlsys_fuzz::TARGETS;
+use dlsys_fuzz::accuracy::{Trial, Verdict};
 
 #[test]
 fn no_target_panics_on_some_inputs() {
@@ -17,4 +20,27 @@ fn no_target_panics_on_some_inputs() {
         assert!(done.status.success(), "{name}: {said}{}", String::from_utf8_lossy(&done.stderr));
         assert!(said.contains("300 inputs") && said.contains("0 panics"), "{name}: {said}");
     }
+}
+
+#[test]
+fn random_models_agree_with_another_way_of_solving_them() {
+    let mut right = 0;
+    for seed in 0..40 {
+        let trial = Trial::new(seed);
+        match trial.judge() {
+            Verdict::Right(_) => right += 1,
+            Verdict::Open | Verdict::Refused(_) => {}
+            Verdict::Wrong(why) => panic!("{seed}: {why}\n{}", trial.plant.text()),
+        }
+    }
+    assert!(right >= 15, "{right} of 40 are compared");
+}
+
+/// The first order of Euler's method is not within the tolerance.
+#[test]
+fn wrong_states_are_noticed() {
+    let verdicts =
+        (0..20).map(|seed| Trial { method: Method::Euler, tolerance: 1e-8, ..Trial::new(seed) }.judge());
+    let wrong = verdicts.filter(|verdict| matches!(verdict, Verdict::Wrong(_))).count();
+    assert!(wrong >= 5, "{wrong} of 20 are wrong");
 }

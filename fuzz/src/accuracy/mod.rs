@@ -1,0 +1,151 @@
+//! Random models against another way of solving them.
+//!
+//! A model is a row of cells that are replaced when a condition becomes true ([`plant`]). [`reference`](mod@reference) solves the same equations with
+//! small steps of the classical Runge-Kutta method and its own reading of what an event is; nothing of dlsys takes part in
+//! that. Where the answer hangs on less than the errors of either, there is no verdict.
+
+mod dice;
+pub mod expression;
+pub mod plant;
+pub mod reference;
+
+pub use dice::Dice;
+
+use dlsys::session::Session;
+use dlsys::sim::{Method, Settings};
+use dlsys::tree::ModuleString;
+
+use plant::Plant;
+use reference::{Course, solve};
+
+/// Errors of parameters, in units of the tolerance, that are still right; the hard cases and benches ask for the same.
+const RIGHT: f64 = 100.0;
+/// Start values are changed by this part of themselves, to see what becomes of a difference.
+const NUDGE: f64 = 1e-7;
+/// Steps of the reference a unit of time, and of the one that tells its error.
+const STEPS: [usize; 2] = [2048, 1024];
+/// Seconds after which a run is given up.
+const LIMIT: f64 = 20.0;
+
+/// What came of a model.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Verdict {
+    /// So many states are right.
+    Right(usize),
+    /// The reference itself does not tell, from the first time on that would be compared.
+    Open,
+    /// An error instead of a result: the message.
+    Refused(String),
+    /// What differs.
+    Wrong(String),
+}
+
+/// A model with the settings of its run.
+pub struct Trial {
+    pub plant: Plant,
+    pub method: Method,
+    pub tolerance: f64,
+}
+
+impl Trial {
+    /// The same for the same seed.
+    pub fn new(seed: u64) -> Trial {
+        let mut dice = Dice::new(seed);
+        let plant = Plant::random(&mut dice);
+        let method = dice.pick(&[Method::Auto, Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau]);
+        let tolerance = dice.pick(&[1e-4, 1e-6, 1e-6, 1e-8]);
+        Trial { plant, method, tolerance }
+    }
+
+    /// The command that shows the result of a file.
+    pub fn command(&self, file: &str) -> String {
+        let times: Vec<String> = self.plant.times.iter().map(f64::to_string).collect();
+        let method = format!("{:?}", self.method).to_lowercase();
+        format!(
+            "dlsys run {file} --method {method} --tolerance {:e} --at {}",
+            self.tolerance,
+            times.join(",")
+        )
+    }
+
+    pub fn judge(&self) -> Verdict {
+        let plant = &self.plant;
+        let [best, coarse] = STEPS.map(|steps| solve(plant, steps, 0.0));
+        let nudged = solve(plant, STEPS[1], NUDGE);
+        // From the first state on that any of them has not reached, or where they differ in more than numbers, nothing is known.
+        let known =
+            [&best, &coarse, &nudged].into_iter().map(|course| course.states.len()).min().unwrap_or(0);
+        let told = |course: &Course, at: usize| (course.events[at], course.states[at].len());
+        let alike =
+            |at: &usize| told(&best, *at) == told(&coarse, *at) && told(&best, *at) == told(&nudged, *at);
+        let known = (0..known).take_while(alike).count();
+        if known == 0 {
+            return Verdict::Open;
+        }
+        let found = match self.run(known) {
+            Ok(found) => found,
+            Err(message) => return Verdict::Refused(message),
+        };
+        for (at, string) in found.iter().enumerate() {
+            let (values, wanted) = (plant.values_of(string), best.states[at].len());
+            let Some(values) = values.filter(|values| values.len() == wanted) else {
+                return Verdict::Wrong(format!(
+                    "t = {}: the cells are not {wanted} between two walls",
+                    plant.times[at]
+                ));
+            };
+            if let Some(why) = self.difference(at, &values, [&best, &coarse, &nudged]) {
+                return Verdict::Wrong(why);
+            }
+        }
+        Verdict::Right(known)
+    }
+
+    /// What dlsys gives at the first times.
+    fn run(&self, count: usize) -> Result<Vec<ModuleString>, String> {
+        let text = self.plant.text();
+        let session = Session::from_text("input.dls", &text, &[]).map_err(|refused| {
+            refused.diagnostics.iter().map(|d| d.render(&refused.source, false)).collect::<String>()
+        })?;
+        let Trial { method, tolerance, .. } = *self;
+        let settings = Settings { method, tolerance, max_seconds: LIMIT, ..Settings::default() };
+        let mut simulation = session.simulate(settings).map_err(|e| e.to_string())?;
+        self.plant.times[..count]
+            .iter()
+            .map(|t| {
+                let mut string = ModuleString::default();
+                simulation.at(*t, &mut string).map_err(|e| e.to_string())?;
+                Ok(string)
+            })
+            .collect()
+    }
+
+    /// The first parameter at a time that is wrong.
+    fn difference(
+        &self,
+        at: usize,
+        found: &[[f64; 3]],
+        [best, coarse, nudged]: [&Course; 3],
+    ) -> Option<String> {
+        let spread = |other: &Course| {
+            let pairs = best.states[at].iter().flatten().zip(other.states[at].iter().flatten());
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        // A difference at the start grows to so many times itself.
+        let growth = (spread(nudged) / NUDGE).max(1.0);
+        for (cell, (found, wanted)) in found.iter().zip(&best.states[at]).enumerate() {
+            for (name, (found, wanted)) in ["x", "c", "v"].iter().zip(found.iter().zip(wanted)) {
+                let bound = RIGHT * self.tolerance * growth * wanted.abs().max(1.0) + 10.0 * spread(coarse);
+                let error = (found - wanted).abs();
+                if error.is_nan() || error > bound {
+                    return Some(format!(
+                        "t = {}, cell {cell}: {name} = {found}, not {wanted}: {:.0} times the tolerance, where a difference grows {growth:.1} times",
+                        self.plant.times[at],
+                        error / self.tolerance
+                    ));
+                }
+            }
+        }
+        None
+    }
+}

@@ -1,0 +1,109 @@
+//! A random row of cells, all under one rule.
+
+use dlsys::tree::ModuleString;
+
+use super::Dice;
+use super::expression::{Condition, Expression, Variable, infix};
+
+/// What the cells read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reads {
+    Nothing,
+    Left,
+    Both,
+}
+
+/// Cells with an age `x`, a value `c` and sometimes a function `v` of all that they have and read. A cell whose condition becomes true is
+/// replaced by none, one or two of age 0.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    pub reads: Reads,
+    /// Values at the two ends, which rest.
+    pub walls: [f64; 2],
+    /// Age and value of each cell.
+    pub start: Vec<[f64; 2]>,
+    pub rate: Expression,
+    pub function: Option<Expression>,
+    pub condition: Condition,
+    /// The values of the successors.
+    pub successors: Vec<Expression>,
+    /// When states are compared.
+    pub times: Vec<f64>,
+}
+
+impl Plant {
+    pub fn random(dice: &mut Dice) -> Plant {
+        let reads = dice.pick(&[Reads::Nothing, Reads::Left, Reads::Both, Reads::Both]);
+        let neighbours: &[Variable] = match reads {
+            Reads::Nothing => &[],
+            Reads::Left => &[Variable::Left],
+            Reads::Both => &[Variable::Left, Variable::Right],
+        };
+        // A row of empty cells is filled from its ends.
+        let (most, level) = if dice.roll(4) == 0 { (12, 0.0) } else { (6, 1.5) };
+        let walls = [dice.between(0.0, 2.0), dice.between(0.0, 2.0)];
+        let start =
+            (0..1 + dice.roll(most)).map(|_| [dice.between(0.0, 1.0), dice.between(0.0, level)]).collect();
+        let mut rate = Expression::term(dice, neighbours);
+        for _ in 0..dice.roll(3) {
+            rate = infix('+', rate, Expression::term(dice, neighbours));
+        }
+        // Without a decay most of them leave the numbers.
+        let decay = infix('*', Expression::Number(dice.between(0.1, 1.5)), Expression::Of(Variable::Own));
+        let rate = infix('-', rate, decay);
+        let function = (dice.roll(3) == 0).then(|| Expression::function(dice, neighbours));
+        let condition = Condition::random(dice, neighbours, function.is_some());
+        let count = dice.pick(&[1, 1, 1, 1, 2, 2, 0]);
+        let successors = (0..count).map(|_| successor(dice)).collect();
+        let step = dice.between(0.2, 1.0);
+        let times = (1..=4).map(|n| f64::from(n) * step).collect();
+        Plant { reads, walls, start, rate, function, condition, successors, times }
+    }
+
+    /// The model in the language.
+    pub fn text(&self) -> String {
+        let (more, p, q, v) =
+            if self.function.is_some() { (", 0", ", p", ", q", ", v") } else { ("", "", "", "") };
+        let cells: Vec<String> = self.start.iter().map(|[x, c]| format!("F_v({x}, {c}{more})")).collect();
+        let (cells, [left, right]) = (cells.join(" "), self.walls);
+        let (before, behind) = (format!("F(u, l{p}) < "), format!(" > F(w, r{q})"));
+        let (before, behind) = match self.reads {
+            Reads::Nothing => ("", ""),
+            Reads::Left => (&before[..], ""),
+            Reads::Both => (&before[..], &behind[..]),
+        };
+        let function = self.function.as_ref().map_or(String::new(), |function| format!(", v = {function}"));
+        let successors = self.successors.iter().map(|value| format!("F_v(0, {value}{more})"));
+        let successors = if self.successors.is_empty() {
+            "ε".to_owned()
+        } else {
+            successors.collect::<Vec<_>>().join(" ")
+        };
+        format!(
+            "initial string: F_w(0, {left}{more}) {cells} F_w(0, {right}{more})\n{before}F_v(x, c{v}){behind}:\n  solve dx/dt = 1, dc/dt = {}{function}\n  if {} produce {successors}\n",
+            self.rate, self.condition
+        )
+    }
+
+    /// Age, value and function, or 0, of each cell in a string; None if it does not begin and end with a wall.
+    pub fn values_of(&self, string: &ModuleString) -> Option<Vec<[f64; 3]>> {
+        let all: Vec<Vec<f64>> = string.iter().map(|module| module.parameters.to_vec()).collect();
+        let walls = [all.first()?, all.last()?].map(|wall| wall.get(1).copied());
+        if walls != self.walls.map(Some) {
+            return None;
+        }
+        let cells = all[1..all.len() - 1].iter();
+        Some(cells.map(|cell| [0, 1, 2].map(|n| cell.get(n).copied().unwrap_or(0.0))).collect())
+    }
+}
+
+/// The value of a successor.
+fn successor(dice: &mut Dice) -> Expression {
+    let own = || Expression::Of(Variable::Own);
+    let constant = Expression::Number(dice.between(0.0, 1.0));
+    match dice.roll(3) {
+        0 => constant,
+        1 => infix('+', constant, infix('*', Expression::Number(0.5), own())),
+        _ => infix('*', Expression::Number(dice.between(-0.5, 0.9)), own()),
+    }
+}
