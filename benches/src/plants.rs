@@ -144,6 +144,19 @@ pub fn busy_and_stiff(cells: usize) -> String {
     busy(cells).replacen(&format!("const D = {D}"), "const D = 10000", 1)
 }
 
+/// Cells between two walls with a flow between two in proportion to the mean of what they hold, and no events.
+pub fn nonlinear(cells: usize) -> String {
+    let mut dice = Dice::new(5);
+    let mut string = String::new();
+    for _ in 0..cells {
+        let _ = write!(string, "F_v({}) ", dice.between(50.0, 200.0));
+    }
+    format!(
+        "const D = {D}\nconst mu = {MU}\nconst w = 255\ninitial string: F_w(w) {string} F_w(w)\n\
+         F(l) < F_v(c) > F(r): solve dc/dt = D/(2*w)*(l^2 + r^2 - 2*c^2) - mu*c\n"
+    )
+}
+
 /// A filament that grows and divides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Growing {

@@ -1,11 +1,13 @@
 //! Measurements of numerical integration: right-hand sides, a busy filament, filaments that grow.
 
+use std::time::Instant;
+
 use cpu_time::ProcessTime as Clock;
 use dlsys::sim::{Scheduler, Settings};
 use dlsys::tree::ModuleString;
 use dlsys_benches::kernels;
 use dlsys_benches::measure::duration;
-use dlsys_benches::plants::{self, Growing};
+use dlsys_benches::plants::{self, Growing, Lives};
 use dlsys_benches::scale::{self, median, with};
 use dlsys_benches::solver;
 
@@ -38,6 +40,7 @@ pub fn busy() -> Outcome {
     let measured = format!("{} a unit of time; `global` {:.0} times that", duration(auto), global / auto);
     line("busy filament, 1,000 cells and events", &measured, "1.5 ms", Some(auto <= 1.5e-3));
     against_kernel(&text)?;
+    many_cells(&text)?;
     stiff()?;
     let times: Vec<f64> = (1..=8).map(|k| 0.37 * f64::from(k)).collect();
     let exact = scale::states(&text, with(Scheduler::Global, 1e-10), &times)?.0;
@@ -58,6 +61,53 @@ fn against_kernel(text: &str) -> Outcome {
     let measured =
         format!("{} : {}, ratio {:.1}", duration(median(ours)), duration(median(plain)), median(ratios));
     line("busy filament, an event, dlsys : the same numerics in plain Rust", &measured, "", None);
+    Ok(())
+}
+
+/// An event among a million cells against one among a thousand, in turns.
+fn many_cells(few: &str) -> Outcome {
+    let many = plants::busy(1_000_000);
+    let (mut costs, mut ratios) = ([Vec::new(), Vec::new()], Vec::new());
+    for _ in 0..3 {
+        let few = scale::work(few, with(Scheduler::Auto, 1e-6), 2.0, 52.0)?.per_event();
+        let many = scale::work(&many, with(Scheduler::Auto, 1e-6), 0.1, 1.1)?.per_event();
+        costs[0].push(few);
+        costs[1].push(many);
+        ratios.push(many / few);
+    }
+    let ([few, many], ratio) = (costs.map(|costs| duration(median(costs))), median(ratios));
+    let measured = format!("{few} and {many}: ratio {ratio:.2}");
+    line("busy filament, an event, 10^3 and 10^6 cells", &measured, "1.5", Some(ratio <= 1.5));
+    Ok(())
+}
+
+/// What two threads gain, in real time and in turns.
+pub fn threads() -> Outcome {
+    let cases = [
+        ("independent modules, 10^6 lives that change", Lives::Various.text(1_000_000), (2.0, 4.0), 1.8),
+        ("nonlinear filament of 10^5 cells", plants::nonlinear(100_000), (0.0, 10.0), 1.6),
+        ("busy filament of 10^5 cells", plants::busy(100_000), (0.1, 1.1), 1.6),
+    ];
+    for (what, text, (from, to), target) in cases {
+        let session = solver::session(&text)?;
+        let one = |threads| -> Result<f64, String> {
+            let settings = Settings { threads, ..Settings::default() };
+            let mut simulation = session.simulate(settings).map_err(|e| e.to_string())?;
+            simulation.pass(from).map_err(|e| e.to_string())?;
+            let begin = Instant::now();
+            simulation.pass(to).map_err(|e| e.to_string())?;
+            Ok(begin.elapsed().as_secs_f64())
+        };
+        let (mut one_thread, mut gains) = (Vec::new(), Vec::new());
+        for _ in 0..ROUNDS {
+            let (alone, shared) = (one(1)?, one(2)?);
+            one_thread.push(alone);
+            gains.push(alone / shared);
+        }
+        let (seconds, gain) = (duration(median(one_thread)), median(gains));
+        let measured = format!("{gain:.2} times as fast as one ({seconds})");
+        line(&format!("two threads, {what}"), &measured, &format!("{target}"), Some(gain >= target));
+    }
     Ok(())
 }
 

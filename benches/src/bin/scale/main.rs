@@ -1,11 +1,12 @@
 //! Prints the table of ratios at scale: `cargo run --release --bin scale [NAME…]`.
 //!
-//! Names: productions, dragon, filament, branches, busy, growing, frames, blocks, parsing, memory, start; all of them by
-//! default. Ratios are those of one run on one machine. Memory and start-up time are measured in separate processes, which
-//! run this program with an internal argument.
+//! Names: parsing, productions, dragon, filament, branches, busy, growing, threads, frames, export, blocks, memory, start; all
+//! of them by default. Ratios are those of one run on one machine. Memory, start-up time and files are measured in separate
+//! processes, which run this program with other arguments.
 
 mod blocks;
 mod cells;
+mod export;
 mod formulas;
 
 use std::process::{Command, ExitCode};
@@ -25,7 +26,7 @@ type Outcome = Result<(), String>;
 /// The measurements by name.
 type Part = (&'static str, fn() -> Outcome);
 
-const PARTS: [Part; 11] = [
+const PARTS: [Part; 13] = [
     ("parsing", formulas::parsing),
     ("productions", formulas::productions),
     ("dragon", formulas::dragon),
@@ -33,7 +34,9 @@ const PARTS: [Part; 11] = [
     ("branches", formulas::branches),
     ("busy", cells::busy),
     ("growing", cells::growing),
+    ("threads", cells::threads),
     ("frames", formulas::frames),
+    ("export", export::export),
     ("blocks", blocks::blocks),
     ("memory", memory),
     ("start", starting),
@@ -42,7 +45,7 @@ const PARTS: [Part; 11] = [
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let outcome = match arguments.first().map(String::as_str) {
-        Some("check") => return ExitCode::from(dlsys::cli::main()),
+        Some("check" | "render") => return ExitCode::from(dlsys::cli::main()),
         Some("peak") => peak(&arguments[1..]),
         _ => table(&arguments),
     };
