@@ -436,6 +436,28 @@ fn a_row_of_empty_cells_is_filled_in_implicit_steps() {
     }
 }
 
+/// Cells that reach a level at nearly one time do so together, also where a condition in a value asks for the level: what one of them
+/// becomes must not keep the next from it.
+#[test]
+fn a_level_in_a_value_is_met_together() {
+    let text = format!(
+        "initial string: W(1.75) {}\nW(l) < A(c, v): solve dc/dt = 0.869*max(l - c, 0) - 0.736*c, v = if c > 0.439 then 1 else l\n if v <= 0.902 produce A(0.604 + 0.5*c, 0)\nA(l, p) < A(c, v): solve dc/dt = 0.869*max(l - c, 0) - 0.736*c, v = if c > 0.439 then 1 else l\n if v <= 0.902 produce A(0.604 + 0.5*c, 0)",
+        "A(0, 0) ".repeat(7)
+    );
+    // All but the first begin with 0.604 and decay until next to nothing has reached the last: it is replaced at 0.439, once.
+    let wanted = (0.604 + 0.5 * 0.439) * (-0.736 * (0.805 - (0.604_f64 / 0.439).ln() / 0.736)).exp();
+    for (method, tolerance) in [Method::Auto, Method::Dopri5, Method::Dop853]
+        .into_iter()
+        .flat_map(|m| [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8].map(|tol| (m, tol)))
+    {
+        let settings = Settings { method, tolerance, ..Settings::default() };
+        let found =
+            run(&text, settings, &[0.805]).unwrap_or_else(|e| panic!("{method:?} {tolerance:e}: {e}"));
+        let c = found[0][7].1[0];
+        assert!((c - wanted).abs() < 10.0 * tolerance + 1e-5, "{method:?} {tolerance:e}: {c}, not {wanted}");
+    }
+}
+
 /// The error of a polynomial that is written out is not that of its terms.
 #[test]
 fn a_narrow_window_may_be_written_out() {

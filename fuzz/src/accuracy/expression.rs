@@ -81,6 +81,10 @@ impl Expression {
     pub fn least_gap(&self, values: &Values) -> f64 {
         match self {
             Number(_) | Of(_) => f64::INFINITY,
+            Call("floor", of) => {
+                let x = of.at(values);
+                (x - x.round()).abs().min(of.least_gap(values))
+            }
             Call(_, of) => of.least_gap(values),
             Pair(_, of) | Infix(_, of) => of[0].least_gap(values).min(of[1].least_gap(values)),
             Where(of) => {

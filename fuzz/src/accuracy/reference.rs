@@ -47,7 +47,7 @@ pub fn solve(plant: &Plant, steps: usize, nudge: f64) -> Course {
                 return course;
             }
         }
-        if time - run.last_event < SOON || run.foresees_event() {
+        if time - run.last_event < SOON || run.foresees_event() || run.is_about_to_jump() {
             return course;
         }
         course.states.push(run.state());
@@ -196,14 +196,6 @@ impl Run<'_> {
             if self.events > MOST_EVENTS || round > MOST_AT_ONCE {
                 return None;
             }
-            // A neighbour that changes may keep a cell from what it was about to do.
-            let function = self.plant.function.iter();
-            let mut decided = function.flat_map(|v| (0..self.cells.len()).map(move |cell| (v, cell)));
-            if decided.any(|(v, cell)| {
-                v.least_gap(&self.values(&self.cells, cell, self.t)) < NEAR && !firing.contains(&cell)
-            }) {
-                return None;
-            }
             let mut next = Vec::new();
             for (cell, own) in self.cells.iter().enumerate() {
                 if !firing.contains(&cell) {
@@ -230,6 +222,13 @@ impl Run<'_> {
         }
         self.last_event = self.t;
         Some(())
+    }
+
+    /// True if the function of a cell jumps where values are only a little others.
+    fn is_about_to_jump(&self) -> bool {
+        let least =
+            |cell| Some(self.plant.function.as_ref()?.least_gap(&self.values(&self.cells, cell, self.t)));
+        (0..self.cells.len()).filter_map(least).any(|gap| gap < NEAR)
     }
 
     /// True if an event is so near that dlsys may be behind it already.

@@ -7,7 +7,7 @@
 //! - [`quiet`]: a short test that spares most searches
 //! - [`pulse`]: rates that are large between the stages of a step; [`calm`]: a short test that spares most of that;
 //!   [`examined`]: what both are told of a step
-//! - [`signs`]: signs of the differences that conditions compare, and their consequences
+//! - [`signs`]: signs of the differences that conditions compare, and their consequences; [`switched`]: those by way of a value
 
 pub mod calm;
 pub mod crossing;
@@ -19,6 +19,7 @@ pub mod pulse;
 pub mod quiet;
 pub mod search;
 pub mod signs;
+pub mod switched;
 
 use std::collections::BTreeMap;
 

@@ -19,6 +19,7 @@ use crate::detect::doubt::{AtomQuery, Lookahead};
 use crate::detect::level::{LevelFinding, LevelQuery};
 use crate::detect::limit::Arrival;
 use crate::detect::signs::{matters, produces};
+use crate::detect::switched;
 use crate::world::path::Path;
 use crate::world::state::{Change, Signs};
 use dlsys_expr::Program;
@@ -180,7 +181,17 @@ impl Search<'_, '_> {
 
     /// True if a production may depend on an atom that is integrated, so that doubts about it have to be reported.
     fn decides(&self, atom: usize) -> bool {
-        self.is_integrated() && produces(self.path.rule, &self.now, atom)
+        self.is_integrated()
+            && (produces(self.path.rule, &self.now, atom) || switched::may_decide(self.path, atom))
+    }
+
+    /// True if a production depends on the sign of an atom at a position by way of a value. Next to nothing it has none.
+    fn decides_by_value(&mut self, atom: usize, position: f64) -> bool {
+        if !switched::decides(self.path, atom, position, &self.now) {
+            return false;
+        }
+        let there = self.detector.difference(self.path, atom).value(position).abs();
+        there > self.detector.least_noise(self.path, atom, position)
     }
 
     /// What lies ahead of an atom, but for limits, at which nothing ever arrives.
@@ -226,7 +237,7 @@ impl Search<'_, '_> {
                 && first.is_none_or(|first| position < first.position)
             {
                 let atom = self.tracked[index].atom;
-                if produces(self.path.rule, &self.now, atom) {
+                if produces(self.path.rule, &self.now, atom) || self.decides_by_value(atom, position) {
                     let (time, at) = (self.path.start.after(position * self.path.h), Sign::Zero);
                     let after = self.now[atom];
                     result.event = Some(position);

@@ -4,6 +4,7 @@ use super::EventStage;
 use super::behind::When;
 use crate::detect::doubt::FAR;
 use crate::detect::signs::{opposite, produces};
+use crate::detect::switched;
 use crate::flow::algebraic::is_algebraic;
 use crate::world::path::Path;
 use crate::world::state::{Change, NextKind, Signs};
@@ -93,9 +94,10 @@ impl EventStage<'_, '_> {
         let atom = (0..rule.atoms.len()).find(|&atom| {
             error > 0.0
                 && matches!(signs[atom], Sign::Plus | Sign::Minus)
-                && produces(rule, &signs, atom)
+                && (produces(rule, &signs, atom) || switched::may_decide(&path, atom))
                 && path.is_integrated(&rule.atom_reads[atom])
                 && self.detector.crossings.is_about_to_meet(&path, atom, signs[atom], factor)
+                && (produces(rule, &signs, atom) || switched::decides(&path, atom, 0.0, &signs))
         })?;
         Some(Change::new(atom, self.instant.at, [Sign::Zero, opposite(signs[atom])]))
     }

@@ -1,0 +1,61 @@
+//! Conditions inside values (`v = if c > 1 then 2 else 0`) that decide over a production because its condition reads the value.
+
+use smallvec::SmallVec;
+
+use crate::detect::signs::opposite;
+use crate::world::path::Path;
+use dlsys_model::{Rule, Sign, Solve, Truth};
+
+/// The active equations, if a switch in them asks for an atom, and the condition of a production reads a value with such switches.
+fn clause<'r>(path: &Path<'r>, atom: usize) -> Option<&'r Solve> {
+    let rule: &'r Rule = path.rule;
+    let solve = &rule.solves[path.state.solve.get()?];
+    let asks = solve.switches.iter().any(|s| s.condition.atoms().any(|(other, _)| other == atom));
+    (asks && !solve.algebraic.is_empty() && read(rule, solve).next().is_some()).then_some(solve)
+}
+
+/// The atoms of productions that read explicit values of a clause.
+fn read<'r>(rule: &'r Rule, solve: &'r Solve) -> impl Iterator<Item = usize> + use<'r> {
+    let values = &solve.algebraic;
+    let is_explicit = |variable: &usize| {
+        let place = values.of.iter().position(|parameter| parameter == variable);
+        place.is_some_and(|place| values.explicit[place])
+    };
+    (0..rule.atoms.len())
+        .filter(move |atom| rule.atom_reads[*atom].iter().any(is_explicit) && rule.decides_productions(*atom))
+}
+
+/// True if a production may follow, by way of a value, when the sides of an atom meet.
+pub fn may_decide(path: &Path, atom: usize) -> bool {
+    clause(path, atom).is_some()
+}
+
+/// True if a production holds at a position with the value that comes when the sides of an atom meet, and not with the one before.
+pub fn decides(path: &Path, atom: usize, position: f64, now: &[Sign]) -> bool {
+    let Some(solve) = clause(path, atom) else { return false };
+    let rule = path.rule;
+    let holds = |sign: Sign| {
+        let mut values = Vec::new();
+        path.everything_at(position, &mut values);
+        let of_atom = |other: usize| if other == atom { sign } else { now[other] };
+        for (value, switch) in values[rule.variables..].iter_mut().zip(&solve.switches) {
+            *value = f64::from(u8::from(switch.condition.judge(of_atom) != Truth::No));
+        }
+        let explicit = &solve.algebraic;
+        let mut out = vec![0.0; explicit.values.outputs()];
+        explicit.values.eval(&values, &mut Vec::new(), &mut out);
+        for ((parameter, value), is_explicit) in explicit.of.iter().zip(out).zip(&explicit.explicit) {
+            if *is_explicit {
+                values[*parameter] = value;
+            }
+        }
+        let mut sides = vec![0.0; rule.sides.outputs()];
+        rule.sides.eval(&values, &mut Vec::new(), &mut sides);
+        let mut signs: SmallVec<[Sign; 8]> = (0..rule.atoms.len()).map(of_atom).collect();
+        for other in read(rule, solve) {
+            signs[other] = Sign::of(sides[2 * other] - sides[2 * other + 1]);
+        }
+        rule.produces.iter().any(|p| p.guard.judge(|i| signs[i]) == Truth::Yes)
+    };
+    holds(opposite(now[atom])) && !holds(now[atom])
+}
