@@ -3,7 +3,7 @@
 use dlsys::tree::ModuleString;
 
 use super::Dice;
-use super::expression::{Condition, Expression, Variable, infix};
+use super::expression::{Comparison, Condition, Expression, Variable, infix};
 
 /// What the cells read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,6 +11,13 @@ pub enum Reads {
     Nothing,
     Left,
     Both,
+}
+
+/// A part of a rate that jumps.
+#[derive(Clone, Debug)]
+pub struct Step {
+    pub sides: [Expression; 2],
+    pub values: [f64; 2],
 }
 
 /// Cells with an age `x`, a value `c` and sometimes a function `v` of all that they have and read. A cell whose condition becomes true is
@@ -23,8 +30,12 @@ pub struct Plant {
     /// Age and value of each cell.
     pub start: Vec<[f64; 2]>,
     pub rate: Expression,
+    /// What the rate is more, where one side is larger than the other, and elsewhere.
+    pub step: Option<Step>,
     pub function: Option<Expression>,
     pub condition: Condition,
+    /// The equations are given for one side of the condition only, if it is a level.
+    pub is_domain: bool,
     /// The values of the successors.
     pub successors: Vec<Expression>,
     /// When states are compared.
@@ -51,13 +62,15 @@ impl Plant {
         // Without a decay most of them leave the numbers.
         let decay = infix('*', Expression::Number(dice.between(0.1, 1.5)), Expression::Of(Variable::Own));
         let rate = infix('-', rate, decay);
+        let jump = (dice.roll(4) == 0).then(|| step(dice, neighbours));
         let function = (dice.roll(3) == 0).then(|| Expression::function(dice, neighbours));
         let condition = Condition::random(dice, neighbours, function.is_some());
+        let is_domain = dice.roll(2) == 0;
         let count = dice.pick(&[1, 1, 1, 1, 2, 2, 0]);
         let successors = (0..count).map(|_| successor(dice)).collect();
-        let step = dice.between(0.2, 1.0);
-        let times = (1..=4).map(|n| f64::from(n) * step).collect();
-        Plant { reads, walls, start, rate, function, condition, successors, times }
+        let pause = dice.between(0.2, 1.0);
+        let times = (1..=4).map(|n| f64::from(n) * pause).collect();
+        Plant { reads, walls, start, rate, step: jump, function, condition, is_domain, successors, times }
     }
 
     /// The model in the language.
@@ -73,6 +86,15 @@ impl Plant {
             Reads::Both => (&before[..], &behind[..]),
         };
         let function = self.function.as_ref().map_or(String::new(), |function| format!(", v = {function}"));
+        let step =
+            self.step.as_ref().map_or(String::new(), |Step { sides: [a, b], values: [more, less] }| {
+                format!(" + (if {a} > {b} then {more} else {less})")
+            });
+        // The form of the paper: equations in a domain, and a production at its boundary.
+        let domain = match &self.condition.comparisons[..] {
+            [Comparison { sides: [a, b], operator: "=" }] if self.is_domain => format!("if {a} < {b} "),
+            _ => String::new(),
+        };
         let successors = self.successors.iter().map(|value| format!("F_v(0, {value}{more})"));
         let successors = if self.successors.is_empty() {
             "ε".to_owned()
@@ -80,7 +102,7 @@ impl Plant {
             successors.collect::<Vec<_>>().join(" ")
         };
         format!(
-            "initial string: F_w(0, {left}{more}) {cells} F_w(0, {right}{more})\n{before}F_v(x, c{v}){behind}:\n  solve dx/dt = 1, dc/dt = {}{function}\n  if {} produce {successors}\n",
+            "initial string: F_w(0, {left}{more}) {cells} F_w(0, {right}{more})\n{before}F_v(x, c{v}){behind}:\n  {domain}solve dx/dt = 1, dc/dt = {}{step}{function}\n  if {} produce {successors}\n",
             self.rate, self.condition
         )
     }
@@ -106,4 +128,16 @@ fn successor(dice: &mut Dice) -> Expression {
         1 => infix('+', constant, infix('*', Expression::Number(0.5), own())),
         _ => infix('*', Expression::Number(dice.between(-0.5, 0.9)), own()),
     }
+}
+
+/// A jump at an age, at a value, or where a neighbour is larger.
+fn step(dice: &mut Dice, neighbours: &[Variable]) -> Step {
+    let (own, age) = (Expression::Of(Variable::Own), Expression::Of(Variable::Age));
+    let level = Expression::Number(dice.between(0.2, 1.5));
+    let sides = match (dice.roll(3), neighbours) {
+        (0, _) => [age, level],
+        (1, [first, ..]) => [Expression::Of(*first), own],
+        _ => [own, level],
+    };
+    Step { sides, values: [dice.between(-1.0, 1.0), dice.between(-1.0, 1.0)] }
 }

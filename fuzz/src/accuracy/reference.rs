@@ -2,7 +2,7 @@
 //! changes its sign.
 
 use super::expression::{Values, Variable};
-use super::plant::Plant;
+use super::plant::{Plant, Step};
 
 /// Sides of a comparison that come so near each other without meeting, or so soon after an event, leave it open what happens.
 const NEAR: f64 = 1e-3;
@@ -10,6 +10,8 @@ const NEAR: f64 = 1e-3;
 const SOON: f64 = 1e-3;
 /// Most events of a course; a cell that is replaced without end has more.
 const MOST_EVENTS: usize = 400;
+/// Most changes of signs of a course.
+const MOST_CUTS: usize = 4000;
 /// Most cells that are replaced at one instant, one after another.
 const MOST_AT_ONCE: usize = 50;
 /// Halvings of a step in which an event is.
@@ -33,7 +35,8 @@ pub struct Course {
 /// Solves the equations with so many steps a unit of time; each value at the start is larger by a part of itself.
 pub fn solve(plant: &Plant, steps: usize, nudge: f64) -> Course {
     let cells: Vec<[f64; 2]> = plant.start.iter().map(|[x, c]| [*x, c + nudge * c.abs().max(1.0)]).collect();
-    let mut run = Run { plant, cells, t: 0.0, events: 0, last_event: f64::NEG_INFINITY, signs: Vec::new() };
+    let mut run =
+        Run { plant, cells, t: 0.0, events: 0, cuts: 0, last_event: f64::NEG_INFINITY, signs: Vec::new() };
     let mut course = Course::default();
     if run.settle(None).is_none() {
         return course;
@@ -61,6 +64,8 @@ struct Run<'p> {
     cells: Vec<[f64; 2]>,
     t: f64,
     events: usize,
+    /// Changes of signs that have been passed.
+    cuts: usize,
     last_event: f64,
     /// The signs of all comparisons of each cell just after the last event.
     signs: Vec<Vec<f64>>,
@@ -83,10 +88,25 @@ impl Run<'_> {
         values.map(|v| [Variable::Age, Variable::Own, Variable::Function].map(|n| v[n as usize])).collect()
     }
 
-    /// The differences of the sides of all comparisons of a cell.
+    /// The rate of a cell. Within a step, what jumps has the value that it has at the beginning.
+    fn rate(&self, cells: &[[f64; 2]], cell: usize, t: f64) -> f64 {
+        let step = self.plant.step.as_ref().map_or(0.0, |Step { values: [more, less], .. }| {
+            if self.signs[cell].last().is_some_and(|sign| *sign > 0.0) { *more } else { *less }
+        });
+        self.plant.rate.at(&self.values(cells, cell, t)) + step
+    }
+
+    /// The differences of the sides of all comparisons of a cell, that of the step in its rate last.
     fn gaps(&self, cells: &[[f64; 2]], cell: usize, t: f64) -> Vec<f64> {
         let values = self.values(cells, cell, t);
-        self.plant.condition.comparisons.iter().map(|comparison| comparison.gap(&values)).collect()
+        let step = self.plant.step.iter().map(|Step { sides: [a, b], .. }| a.at(&values) - b.at(&values));
+        self.plant
+            .condition
+            .comparisons
+            .iter()
+            .map(|comparison| comparison.gap(&values))
+            .chain(step)
+            .collect()
     }
 
     fn all_gaps(&self, cells: &[[f64; 2]], t: f64) -> Vec<Vec<f64>> {
@@ -96,7 +116,7 @@ impl Run<'_> {
     /// The cells after a step of this length.
     fn step(&self, h: f64) -> Vec<[f64; 2]> {
         let rates = |cells: &[[f64; 2]], t: f64| -> Vec<f64> {
-            (0..cells.len()).map(|cell| self.plant.rate.at(&self.values(cells, cell, t))).collect()
+            (0..cells.len()).map(|cell| self.rate(cells, cell, t)).collect()
         };
         let moved = |by: f64, rates: &[f64]| -> Vec<[f64; 2]> {
             self.cells.iter().zip(rates).map(|([x, c], rate)| [x + by, c + by * rate]).collect()
@@ -126,6 +146,11 @@ impl Run<'_> {
                 self.passes_far(&before, &after, h)?;
                 (self.cells, self.t) = (next, to);
                 continue;
+            }
+            // Equations may push a cell against a level from both sides.
+            self.cuts += 1;
+            if self.cuts > MOST_CUTS {
+                return None;
             }
             // The last instant before a change.
             let (mut lo, mut hi) = (0.0, h);
