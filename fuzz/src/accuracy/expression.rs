@@ -14,10 +14,12 @@ pub enum Variable {
     Time,
     /// The parameter that is a function of the others.
     Function,
+    /// That of the cell on the left; 0 of a wall.
+    LeftFunction,
 }
 
 /// The values of the variables, in the order of [`Variable`].
-pub type Values = [f64; 6];
+pub type Values = [f64; 7];
 
 #[derive(Clone, Debug)]
 pub enum Expression {
@@ -151,7 +153,7 @@ impl fmt::Display for Expression {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Number(x) => write!(f, "{x}"),
-            Of(variable) => f.write_str(["x", "c", "l", "r", "t", "v"][*variable as usize]),
+            Of(variable) => f.write_str(["x", "c", "l", "r", "t", "v", "p"][*variable as usize]),
             Call(name, of) => write!(f, "{name}({of})"),
             Pair(name, of) => write!(f, "{name}({}, {})", of[0], of[1]),
             Infix(operator, of) => write!(f, "({} {operator} {})", of[0], of[1]),
@@ -172,6 +174,7 @@ impl Comparison {
         let (own, age) = (|| Of(Variable::Own), || Of(Variable::Age));
         let other = if neighbours.is_empty() { Variable::Time } else { dice.pick(neighbours) };
         let left = match dice.roll(9) {
+            0 if has_function && !neighbours.is_empty() => Of(Variable::LeftFunction),
             0..3 if has_function => Of(Variable::Function),
             0..3 => own(),
             3 => age(),

@@ -73,10 +73,19 @@ struct Run<'p> {
 
 impl Run<'_> {
     fn values(&self, cells: &[[f64; 2]], cell: usize, t: f64) -> Values {
+        let mut values = self.own_values(cells, cell, t);
+        if let (Some(function), Some(left)) = (&self.plant.function, cell.checked_sub(1)) {
+            values[Variable::LeftFunction as usize] = function.at(&self.own_values(cells, left, t));
+        }
+        values
+    }
+
+    /// The same but for the function of the cell on the left.
+    fn own_values(&self, cells: &[[f64; 2]], cell: usize, t: f64) -> Values {
         let [left, right] = self.plant.walls;
         let l = if cell == 0 { left } else { cells[cell - 1][1] };
         let r = cells.get(cell + 1).map_or(right, |next| next[1]);
-        let mut values = [cells[cell][0], cells[cell][1], l, r, t, 0.0];
+        let mut values = [cells[cell][0], cells[cell][1], l, r, t, 0.0, 0.0];
         if let Some(function) = &self.plant.function {
             values[Variable::Function as usize] = function.at(&values);
         }
