@@ -1,4 +1,4 @@
-//! A random row of cells, all under one rule.
+//! A random row of cells of one kind, or two.
 
 use dlsys::tree::ModuleString;
 
@@ -12,6 +12,12 @@ pub enum Reads {
     Left,
     Both,
 }
+
+/// The age, the value and the number of the kind of a cell.
+pub type Cell = [f64; 3];
+
+/// The names of the kinds.
+const KINDS: [&str; 2] = ["F_v", "F_y"];
 
 /// A part of a rate that jumps.
 #[derive(Clone, Debug)]
@@ -27,9 +33,10 @@ pub struct Plant {
     pub reads: Reads,
     /// Values at the two ends, which rest.
     pub walls: [f64; 2],
-    /// Age and value of each cell.
-    pub start: Vec<[f64; 2]>,
-    pub rate: Expression,
+    /// Age, value and kind, 0 or 1, of each cell.
+    pub start: Vec<Cell>,
+    /// The rates of a kind or two. The second successor of a cell is of the other kind.
+    pub rates: Vec<Expression>,
     /// What the rate is more, where one side is larger than the other, and elsewhere.
     pub step: Option<Step>,
     pub function: Option<Expression>,
@@ -53,15 +60,11 @@ impl Plant {
         // A row of empty cells is filled from its ends.
         let (most, level) = if dice.roll(4) == 0 { (12, 0.0) } else { (6, 1.5) };
         let walls = [dice.between(0.0, 2.0), dice.between(0.0, 2.0)];
-        let start =
-            (0..1 + dice.roll(most)).map(|_| [dice.between(0.0, 1.0), dice.between(0.0, level)]).collect();
-        let mut rate = Expression::term(dice, neighbours);
-        for _ in 0..dice.roll(3) {
-            rate = infix('+', rate, Expression::term(dice, neighbours));
-        }
-        // Without a decay most of them leave the numbers.
-        let decay = infix('*', Expression::Number(dice.between(0.1, 1.5)), Expression::Of(Variable::Own));
-        let rate = infix('-', rate, decay);
+        let kinds = 1 + dice.roll(4) / 3;
+        let start = (0..1 + dice.roll(most))
+            .map(|_| [dice.between(0.0, 1.0), dice.between(0.0, level), dice.roll(kinds) as f64])
+            .collect();
+        let rates = (0..kinds).map(|_| rate(dice, neighbours)).collect();
         let jump = (dice.roll(4) == 0).then(|| step(dice, neighbours));
         let function = (dice.roll(3) == 0).then(|| Expression::function(dice, neighbours));
         let condition = Condition::random(dice, neighbours, function.is_some());
@@ -70,14 +73,15 @@ impl Plant {
         let successors = (0..count).map(|_| successor(dice)).collect();
         let pause = dice.between(0.2, 1.0);
         let times = (1..=4).map(|n| f64::from(n) * pause).collect();
-        Plant { reads, walls, start, rate, step: jump, function, condition, is_domain, successors, times }
+        Plant { reads, walls, start, rates, step: jump, function, condition, is_domain, successors, times }
     }
 
     /// The model in the language.
     pub fn text(&self) -> String {
         let (more, p, q, v) =
             if self.function.is_some() { (", 0", ", p", ", q", ", v") } else { ("", "", "", "") };
-        let cells: Vec<String> = self.start.iter().map(|[x, c]| format!("F_v({x}, {c}{more})")).collect();
+        let cell = |[x, c, kind]: &Cell| format!("{}({x}, {c}{more})", KINDS[*kind as usize]);
+        let cells: Vec<String> = self.start.iter().map(cell).collect();
         let (cells, [left, right]) = (cells.join(" "), self.walls);
         let (before, behind) = (format!("F(u, l{p}) < "), format!(" > F(w, r{q})"));
         let (before, behind) = match self.reads {
@@ -95,16 +99,24 @@ impl Plant {
             [Comparison { sides: [a, b], operator: "=" }] if self.is_domain => format!("if {a} < {b} "),
             _ => String::new(),
         };
-        let successors = self.successors.iter().map(|value| format!("F_v(0, {value}{more})"));
-        let successors = if self.successors.is_empty() {
-            "ε".to_owned()
-        } else {
-            successors.collect::<Vec<_>>().join(" ")
-        };
-        format!(
-            "initial string: F_w(0, {left}{more}) {cells} F_w(0, {right}{more})\n{before}F_v(x, c{v}){behind}:\n  {domain}solve dx/dt = 1, dc/dt = {}{step}{function}\n  if {} produce {successors}\n",
-            self.rate, self.condition
-        )
+        let mut text = format!("initial string: F_w(0, {left}{more}) {cells} F_w(0, {right}{more})\n");
+        for (kind, rate) in self.rates.iter().enumerate() {
+            // A rule that no cell can have is an error.
+            if self.successors.len() < 2 && self.start.iter().all(|cell| cell[2] as usize != kind) {
+                continue;
+            }
+            let of_kind = |n: usize| KINDS[(kind + n) % self.rates.len()];
+            let successors = self.successors.iter().enumerate();
+            let successors = successors.map(|(n, value)| format!("{}(0, {value}{more})", of_kind(n)));
+            let successors: Vec<String> = successors.collect();
+            let successors = if successors.is_empty() { "ε".to_owned() } else { successors.join(" ") };
+            text += &format!(
+                "{before}{}(x, c{v}){behind}:\n  {domain}solve dx/dt = 1, dc/dt = {rate}{step}{function}\n  if {} produce {successors}\n",
+                of_kind(0),
+                self.condition
+            );
+        }
+        text
     }
 
     /// Age, value and function, or 0, of each cell in a string; None if it does not begin and end with a wall.
@@ -140,4 +152,13 @@ fn step(dice: &mut Dice, neighbours: &[Variable]) -> Step {
         _ => [own, level],
     };
     Step { sides, values: [dice.between(-1.0, 1.0), dice.between(-1.0, 1.0)] }
+}
+
+/// A sum of terms. Without a decay most plants leave the numbers.
+fn rate(dice: &mut Dice, neighbours: &[Variable]) -> Expression {
+    let mut rate = Expression::term(dice, neighbours);
+    for _ in 0..dice.roll(3) {
+        rate = infix('+', rate, Expression::term(dice, neighbours));
+    }
+    infix('-', rate, infix('*', Expression::Number(dice.between(0.1, 1.5)), Expression::Of(Variable::Own)))
 }

@@ -2,7 +2,7 @@
 //! changes its sign.
 
 use super::expression::{Values, Variable};
-use super::plant::{Plant, Step};
+use super::plant::{Cell, Plant, Step};
 
 /// Sides of a comparison that come so near each other without meeting, or so soon after an event, leave it open what happens.
 const NEAR: f64 = 1e-3;
@@ -34,7 +34,8 @@ pub struct Course {
 
 /// Solves the equations with so many steps a unit of time; each value at the start is larger by a part of itself.
 pub fn solve(plant: &Plant, steps: usize, nudge: f64) -> Course {
-    let cells: Vec<[f64; 2]> = plant.start.iter().map(|[x, c]| [*x, c + nudge * c.abs().max(1.0)]).collect();
+    let nudged = |[x, c, kind]: &Cell| [*x, c + nudge * c.abs().max(1.0), *kind];
+    let cells: Vec<Cell> = plant.start.iter().map(nudged).collect();
     let mut run =
         Run { plant, cells, t: 0.0, events: 0, cuts: 0, last_event: f64::NEG_INFINITY, signs: Vec::new() };
     let mut course = Course::default();
@@ -61,7 +62,7 @@ pub fn solve(plant: &Plant, steps: usize, nudge: f64) -> Course {
 
 struct Run<'p> {
     plant: &'p Plant,
-    cells: Vec<[f64; 2]>,
+    cells: Vec<Cell>,
     t: f64,
     events: usize,
     /// Changes of signs that have been passed.
@@ -72,7 +73,7 @@ struct Run<'p> {
 }
 
 impl Run<'_> {
-    fn values(&self, cells: &[[f64; 2]], cell: usize, t: f64) -> Values {
+    fn values(&self, cells: &[Cell], cell: usize, t: f64) -> Values {
         let mut values = self.own_values(cells, cell, t);
         if let (Some(function), Some(left)) = (&self.plant.function, cell.checked_sub(1)) {
             values[Variable::LeftFunction as usize] = function.at(&self.own_values(cells, left, t));
@@ -81,7 +82,7 @@ impl Run<'_> {
     }
 
     /// The same but for the function of the cell on the left.
-    fn own_values(&self, cells: &[[f64; 2]], cell: usize, t: f64) -> Values {
+    fn own_values(&self, cells: &[Cell], cell: usize, t: f64) -> Values {
         let [left, right] = self.plant.walls;
         let l = if cell == 0 { left } else { cells[cell - 1][1] };
         let r = cells.get(cell + 1).map_or(right, |next| next[1]);
@@ -98,15 +99,15 @@ impl Run<'_> {
     }
 
     /// The rate of a cell. Within a step, what jumps has the value that it has at the beginning.
-    fn rate(&self, cells: &[[f64; 2]], cell: usize, t: f64) -> f64 {
+    fn rate(&self, cells: &[Cell], cell: usize, t: f64) -> f64 {
         let step = self.plant.step.as_ref().map_or(0.0, |Step { values: [more, less], .. }| {
             if self.signs[cell].last().is_some_and(|sign| *sign > 0.0) { *more } else { *less }
         });
-        self.plant.rate.at(&self.values(cells, cell, t)) + step
+        self.plant.rates[cells[cell][2] as usize].at(&self.values(cells, cell, t)) + step
     }
 
     /// The differences of the sides of all comparisons of a cell, that of the step in its rate last.
-    fn gaps(&self, cells: &[[f64; 2]], cell: usize, t: f64) -> Vec<f64> {
+    fn gaps(&self, cells: &[Cell], cell: usize, t: f64) -> Vec<f64> {
         let values = self.values(cells, cell, t);
         let step = self.plant.step.iter().map(|Step { sides: [a, b], .. }| a.at(&values) - b.at(&values));
         self.plant
@@ -118,17 +119,17 @@ impl Run<'_> {
             .collect()
     }
 
-    fn all_gaps(&self, cells: &[[f64; 2]], t: f64) -> Vec<Vec<f64>> {
+    fn all_gaps(&self, cells: &[Cell], t: f64) -> Vec<Vec<f64>> {
         (0..cells.len()).map(|cell| self.gaps(cells, cell, t)).collect()
     }
 
     /// The cells after a step of this length.
-    fn step(&self, h: f64) -> Vec<[f64; 2]> {
-        let rates = |cells: &[[f64; 2]], t: f64| -> Vec<f64> {
+    fn step(&self, h: f64) -> Vec<Cell> {
+        let rates = |cells: &[Cell], t: f64| -> Vec<f64> {
             (0..cells.len()).map(|cell| self.rate(cells, cell, t)).collect()
         };
-        let moved = |by: f64, rates: &[f64]| -> Vec<[f64; 2]> {
-            self.cells.iter().zip(rates).map(|([x, c], rate)| [x + by, c + by * rate]).collect()
+        let moved = |by: f64, rates: &[f64]| -> Vec<Cell> {
+            self.cells.iter().zip(rates).map(|([x, c, kind], rate)| [x + by, c + by * rate, *kind]).collect()
         };
         let a = rates(&self.cells, self.t);
         let b = rates(&moved(0.5 * h, &a), self.t + 0.5 * h);
@@ -237,7 +238,9 @@ impl Run<'_> {
                     continue;
                 }
                 let values = self.values(&self.cells, cell, self.t);
-                next.extend(self.plant.successors.iter().map(|value| [0.0, value.at(&values)]));
+                let kind = |n: usize| (own[2] as usize + n) % self.plant.rates.len();
+                let successors = self.plant.successors.iter().enumerate();
+                next.extend(successors.map(|(n, value)| [0.0, value.at(&values), kind(n) as f64]));
             }
             self.cells = next;
             if self.cells.len() > MOST_CELLS {
