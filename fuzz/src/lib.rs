@@ -2,6 +2,11 @@
 //! ([`accuracy`]).
 
 pub mod accuracy;
+mod dice;
+mod options;
+
+pub use dice::Dice;
+pub use options::Options;
 
 use std::path::Path;
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::Dice;
+use crate::Dice;
 
 /// What expressions read.
 #[derive(Clone, Copy, Debug)]

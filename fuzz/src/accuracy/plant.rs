@@ -2,8 +2,8 @@
 
 use dlsys::tree::ModuleString;
 
-use super::Dice;
 use super::expression::{Comparison, Condition, Expression, Variable, infix};
+use crate::Dice;
 
 /// What the cells read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,24 +8,18 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Instant;
 
+use dlsys_fuzz::Options;
 use dlsys_fuzz::accuracy::{Trial, Verdict};
 
 /// Numbers of models for one seed.
 const NUMBERS: u64 = 1 << 32;
 
 fn main() {
-    let mut arguments = std::env::args().skip(1);
-    let (mut seconds, mut most, mut seed, mut only) = (60.0_f64, u64::MAX, 1_u64, None);
-    while let Some(argument) = arguments.next() {
-        let mut value = || arguments.next().unwrap_or_default();
-        match argument.as_str() {
-            "--seconds" => seconds = value().parse().expect("--seconds S"),
-            "--count" => (most, seconds) = (value().parse().expect("--count N"), f64::INFINITY),
-            "--seed" => seed = value().parse().expect("--seed N"),
-            "--only" => only = Some(value().parse::<u64>().expect("--only N")),
-            other => panic!("`{other}` is none of --seconds, --count, --seed, --only"),
-        }
-    }
+    let mut only = None;
+    let Options { seconds, most, seed } = Options::read(|argument, value| match argument {
+        "--only" => only = Some(value().parse::<u64>().expect("--only N")),
+        other => panic!("`{other}` is none of --seconds, --count, --seed, --only"),
+    });
     let trial = |number: u64| Trial::new(seed.wrapping_mul(NUMBERS).wrapping_add(number));
     if let Some(number) = only {
         let trial = trial(number);
@@ -45,8 +39,9 @@ fn main() {
             Verdict::Refused(message) => {
                 // Messages name places and numbers behind their first words.
                 let line = message.lines().next().unwrap_or_default();
-                let words = line.split(|c: char| c.is_ascii_digit()).next().unwrap_or_default();
-                refused.entry(words.trim_end().to_owned()).or_insert((0, count)).0 += 1;
+                let words =
+                    line.split(|c: char| c.is_ascii_digit()).map(str::trim).find(|words| !words.is_empty());
+                refused.entry(words.unwrap_or(line).to_owned()).or_insert((0, count)).0 += 1;
             }
             Verdict::Wrong(why) => {
                 wrong += 1;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use dlsys_fuzz::TARGETS;
+use dlsys_fuzz::{Dice, Options, TARGETS};
 
 /// Inputs that take longer than this count as a hang.
 const HANG: Duration = Duration::from_secs(10);
@@ -31,18 +31,6 @@ const NUMBERS: [&str; 14] = [
 ];
 /// Larger inputs are truncated: small ones suffice to find errors.
 const MOST: usize = 6000;
-
-/// Numbers that are the same everywhere.
-struct Dice(u64);
-
-impl Dice {
-    fn roll(&mut self, n: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 33) as usize % n.max(1)
-    }
-}
 
 /// Adds the files of a folder and those in it that end so and are short enough.
 fn collect(folder: &Path, endings: &[&str], corpus: &mut Vec<Vec<u8>>) {
@@ -145,17 +133,8 @@ fn keep(target: &str, kind: &str, number: u64, input: &[u8]) {
 }
 
 fn main() {
-    let mut arguments = std::env::args().skip(1);
-    let (mut seconds, mut most, mut seed, mut name) = (60.0_f64, u64::MAX, 1_u64, "front".to_owned());
-    while let Some(argument) = arguments.next() {
-        let mut value = || arguments.next().unwrap_or_default();
-        match argument.as_str() {
-            "--seconds" => seconds = value().parse().expect("--seconds S"),
-            "--count" => (most, seconds) = (value().parse().expect("--count N"), f64::INFINITY),
-            "--seed" => seed = value().parse().expect("--seed N"),
-            other => name = other.to_owned(),
-        }
-    }
+    let mut name = "front".to_owned();
+    let Options { seconds, most, seed } = Options::read(|argument, _| argument.clone_into(&mut name));
     let (name, target) = *TARGETS
         .iter()
         .find(|(known, _)| *known == name)
@@ -185,7 +164,7 @@ fn main() {
             }
         }
     });
-    let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
+    let mut dice = Dice::new(seed);
     let (mut count, mut panics) = (0_u64, 0);
     std::panic::set_hook(Box::new(|panic| eprintln!("{panic}")));
     while begun.elapsed().as_secs_f64() < seconds && count < most {
