@@ -458,6 +458,54 @@ fn a_level_in_a_value_is_met_together() {
     }
 }
 
+/// Cells that no influence has reached yet are not below zero, though the polynomials of integration are, by their noise: a production for what
+/// is below zero never takes place, and nothing is in doubt.
+#[test]
+fn empty_cells_are_not_below_zero() {
+    let row = |cells: usize, rate: &str, value: &str, guard: &str| {
+        let cells = "F(0, 0) ".repeat(cells);
+        format!(
+            "initial string: W(1.446, 0) {cells} W(0.556, 0)\nF(l, p) < F(c, v) > F(r, q):\n solve dc/dt = {rate}, v = {value}\n {guard}"
+        )
+        .replace("W(", "F_w(")
+        .replace("F(0", "F_v(0")
+        .replace("< F(c", "< F_v(c")
+    };
+    let rates = [
+        "0.702*(l + r - 2*c) + 1.332*c + 1.86*abs(r - c) - 0.897*c",
+        "0.128*c + 1.646*l/(1 + c*c) - 1.229*c",
+        "1.336*max(l - c, 0) + 0.331*abs(r - c) - 0.504*c",
+    ];
+    let guards = [
+        ("0", "if c < 0 produce F_v(0.4, 0)"),
+        ("0", "if c + r < 0 produce ε"),
+        ("floor(3.612*c)", "if v < 0 produce F_v(0.4, 0)"),
+        ("if c < 0 then 1 else 0", "if v > 0.5 produce ε"),
+    ];
+    for rate in rates {
+        for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau] {
+            for tolerance in [1e-4, 1e-6, 1e-8] {
+                let settings = Settings { method, tolerance, ..Settings::default() };
+                for (value, guard) in guards {
+                    let [with, without] = [guard, ""].map(|guard| {
+                        let text = row(10, rate, value, guard);
+                        run(&text, settings, &[0.48]).unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"))
+                    });
+                    let [with, without] = [with, without].map(|mut states| states.swap_remove(0));
+                    assert_eq!(with.len(), without.len(), "{method:?} {tolerance:e}: {rate}; {guard}");
+                    for (a, b) in with.iter().zip(&without) {
+                        let off = (a.1[0] - b.1[0]).abs();
+                        assert!(
+                            off < 100.0 * tolerance,
+                            "{method:?} {tolerance:e}: {rate}; {guard}: {off:e}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// The error of a polynomial that is written out is not that of its terms.
 #[test]
 fn a_narrow_window_may_be_written_out() {

@@ -16,10 +16,14 @@ pub enum Variable {
     Function,
     /// That of the cell on the left; 0 of a wall.
     LeftFunction,
+    /// The sum of the values of the cells that are attached in a tree.
+    Sum,
+    /// The largest of these values; 0 of none.
+    Largest,
 }
 
 /// The values of the variables, in the order of [`Variable`].
-pub type Values = [f64; 7];
+pub type Values = [f64; 9];
 
 #[derive(Clone, Debug)]
 pub enum Expression {
@@ -153,7 +157,11 @@ impl fmt::Display for Expression {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Number(x) => write!(f, "{x}"),
-            Of(variable) => f.write_str(["x", "c", "l", "r", "t", "v", "p"][*variable as usize]),
+            Of(variable) => {
+                let attached = ["sum(F(y, d, e): d)", "largest(F(y, d, e): d)"];
+                let names = ["x", "c", "l", "r", "t", "v", "p", attached[0], attached[1]];
+                f.write_str(names[*variable as usize])
+            }
             Call(name, of) => write!(f, "{name}({of})"),
             Pair(name, of) => write!(f, "{name}({}, {})", of[0], of[1]),
             Infix(operator, of) => write!(f, "({} {operator} {})", of[0], of[1]),

@@ -1,12 +1,13 @@
 //! Random models against another way of solving them.
 //!
-//! A model is a row of cells that are replaced when a condition becomes true ([`plant`]). [`reference`](mod@reference) solves the same equations with
+//! A model is a row or a tree of cells that are replaced when a condition becomes true ([`plant`]). [`reference`](mod@reference) solves the same equations with
 //! small steps of the classical Runge-Kutta method and its own reading of what an event is; nothing of dlsys takes part in
 //! that. Where the answer hangs on less than the errors of either, there is no verdict.
 
 pub mod expression;
 pub mod plant;
 pub mod reference;
+pub mod shape;
 
 use crate::Dice;
 use dlsys::session::Session;
@@ -93,10 +94,7 @@ impl Trial {
         for (at, string) in found.iter().enumerate() {
             let (values, wanted) = (plant.values_of(string), best.states[at].len());
             let Some(values) = values.filter(|values| values.len() == wanted) else {
-                return Verdict::Wrong(format!(
-                    "t = {}: the cells are not {wanted} between two walls",
-                    plant.times[at]
-                ));
+                return Verdict::Wrong(format!("t = {}: there are not {wanted} cells", plant.times[at]));
             };
             if let Some(why) = self.difference(at, &values, [&best, &coarse, &nudged]) {
                 return Verdict::Wrong(why);

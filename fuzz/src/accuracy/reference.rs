@@ -3,6 +3,7 @@
 
 use super::expression::{Values, Variable};
 use super::plant::{Cell, Plant, Step};
+use super::shape::{Relatives, Shape};
 
 /// Sides of a comparison that come so near each other without meeting, or so soon after an event, leave it open what happens.
 const NEAR: f64 = 1e-3;
@@ -36,8 +37,17 @@ pub struct Course {
 pub fn solve(plant: &Plant, steps: usize, nudge: f64) -> Course {
     let nudged = |[x, c, kind]: &Cell| [*x, c + nudge * c.abs().max(1.0), *kind];
     let cells: Vec<Cell> = plant.start.iter().map(nudged).collect();
-    let mut run =
-        Run { plant, cells, t: 0.0, events: 0, cuts: 0, last_event: f64::NEG_INFINITY, signs: Vec::new() };
+    let mut run = Run {
+        plant,
+        relatives: plant.shape.relatives(),
+        shape: plant.shape.clone(),
+        cells,
+        t: 0.0,
+        events: 0,
+        cuts: 0,
+        last_event: f64::NEG_INFINITY,
+        signs: Vec::new(),
+    };
     let mut course = Course::default();
     if run.settle(None).is_none() {
         return course;
@@ -63,6 +73,8 @@ pub fn solve(plant: &Plant, steps: usize, nudge: f64) -> Course {
 struct Run<'p> {
     plant: &'p Plant,
     cells: Vec<Cell>,
+    shape: Shape,
+    relatives: Vec<Relatives>,
     t: f64,
     events: usize,
     /// Changes of signs that have been passed.
@@ -75,8 +87,11 @@ struct Run<'p> {
 impl Run<'_> {
     fn values(&self, cells: &[Cell], cell: usize, t: f64) -> Values {
         let mut values = self.own_values(cells, cell, t);
-        if let (Some(function), Some(left)) = (&self.plant.function, cell.checked_sub(1)) {
-            values[Variable::LeftFunction as usize] = function.at(&self.own_values(cells, left, t));
+        if self.plant.function.is_some()
+            && let Some(left) = self.relatives[cell].below
+        {
+            let function = self.plant.function_at(&self.own_values(cells, left, t));
+            values[Variable::LeftFunction as usize] = function.unwrap_or(0.0);
         }
         values
     }
@@ -84,12 +99,14 @@ impl Run<'_> {
     /// The same but for the function of the cell on the left.
     fn own_values(&self, cells: &[Cell], cell: usize, t: f64) -> Values {
         let [left, right] = self.plant.walls;
-        let l = if cell == 0 { left } else { cells[cell - 1][1] };
-        let r = cells.get(cell + 1).map_or(right, |next| next[1]);
-        let mut values = [cells[cell][0], cells[cell][1], l, r, t, 0.0, 0.0];
-        if let Some(function) = &self.plant.function {
-            values[Variable::Function as usize] = function.at(&values);
-        }
+        let Relatives { below, attached } = &self.relatives[cell];
+        let l = below.map_or(left, |below| cells[below][1]);
+        let above = attached.iter().map(|other| cells[*other][1]);
+        // In a row at most one is attached.
+        let r = above.clone().next().unwrap_or(right);
+        let (sum, largest) = (above.clone().sum(), above.reduce(f64::max).unwrap_or(0.0));
+        let mut values = [cells[cell][0], cells[cell][1], l, r, t, 0.0, 0.0, sum, largest];
+        values[Variable::Function as usize] = self.plant.function_at(&values).unwrap_or(0.0);
         values
     }
 
@@ -243,6 +260,8 @@ impl Run<'_> {
                 next.extend(successors.map(|(n, value)| [0.0, value.at(&values), kind(n) as f64]));
             }
             self.cells = next;
+            self.shape = self.shape.after(&firing, self.plant.successors.len(), self.plant.forks);
+            self.relatives = self.shape.relatives();
             if self.cells.len() > MOST_CELLS {
                 return None;
             }

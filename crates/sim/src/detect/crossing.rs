@@ -295,6 +295,7 @@ impl CrossingDetector {
         };
         if is_among_others && position == from && at == Sign::Zero && start.abs() <= tolerance {
             position = self.way_out(path, atom, (from, limit), tolerance);
+            after = self.side_taken(path, atom, (from, limit)).unwrap_or(after);
         }
         if at == after && after == opposite(sign) && self.passes_by_rounding(path, atom, position) {
             at = Sign::Zero;
@@ -321,6 +322,15 @@ impl CrossingDetector {
             reach *= 0.5;
         }
         from + reach
+    }
+
+    /// The side on which a difference is that leaves zero at the beginning of a stretch, as soon as it is more than what the polynomial may be wrong by there;
+    /// None if it is nowhere.
+    fn side_taken(&mut self, path: &Path, atom: usize, (from, limit): (f64, f64)) -> Option<Sign> {
+        let noise = self.noise_on_the_way(path, atom, from);
+        let there = self.way_out(path, atom, (from, limit), noise);
+        let value = self.difference(path, atom).value(there);
+        (value.abs() > noise).then_some(Sign::of(value))
     }
 
     /// The parameter of the module, or of a neighbour, or the time, whose value the condition of a production compares with a level that rests, and the level.
@@ -354,7 +364,18 @@ impl CrossingDetector {
     /// The effect on the difference of two sides of errors of integration that nobody follows, because the values are next to nothing: what has not
     /// arrived has no sign. 0 where the difference jumps.
     pub(super) fn least_noise(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
-        path.next_to_nothing(at, &mut self.around);
+        path.next_to_nothing(at, false, &mut self.around);
+        self.width_around(path, atom)
+    }
+
+    /// The same, and of those inside the step of values that are next to nothing and become more.
+    pub(super) fn noise_on_the_way(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        path.next_to_nothing(at, true, &mut self.around);
+        self.width_around(path, atom)
+    }
+
+    /// Half the width of the difference of two sides of values that are around some; 0 where the difference jumps.
+    fn width_around(&mut self, path: &Path, atom: usize) -> f64 {
         let sides = &path.rule.sides;
         self.around_out.resize(sides.outputs(), Interval::EMPTY);
         sides.eval(&self.around, &mut self.whole_scratch, &mut self.around_out);

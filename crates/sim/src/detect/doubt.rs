@@ -192,6 +192,11 @@ impl CrossingDetector {
         {
             return ahead;
         }
+        if next.is_none()
+            && let Some(ahead) = self.grow(path, &mut query, start, noise)
+        {
+            return ahead;
+        }
         match self.approach(path, query, next, crossing, noise) {
             Some(ahead) => ahead,
             None => self.confirm(path, query, next, crossing, noise),
@@ -225,6 +230,25 @@ impl CrossingDetector {
                 None
             }
         }
+    }
+
+    /// What lies ahead of a difference that is so small at first that the noise of what it grows to is larger, before it has grown beyond that; None if nothing
+    /// does, or if it is no such difference. `query` then begins where it has.
+    fn grow(&mut self, path: &Path, query: &mut AtomQuery, start: f64, noise: f64) -> Option<Lookahead> {
+        if start <= query.tolerance || start > noise {
+            return None;
+        }
+        let grown = self.leaves(path, *query, noise, query.sign)?;
+        // There the noise is that part of this one by which values are uncertain, unless it has another reason.
+        if self.noise(path, query.atom, grown) > 0.5 * noise {
+            return None;
+        }
+        let ahead = self.look(path, AtomQuery { limit: grown, ..*query });
+        if ahead.next.is_some() || ahead.doubt.is_some() {
+            return Some(ahead);
+        }
+        (query.from, query.near) = (grown, false);
+        None
     }
 
     /// The position of the crossing of a difference that starts inside the band and leaves it on the other side at
@@ -355,13 +379,14 @@ impl CrossingDetector {
         );
         // By each term for itself, bounds of what is written out (`x^2 - 2*x + 1`) are far too wide.
         let width = if is_sum || width == 0.0 { width } else { width.min(self.sensitivity(path, atom, at)) };
-        // What stands alone, or is compared with a number, may be next to nothing and follow its own size all the same; of two that differ by less than
-        // what is followed nobody knows which is larger.
+        // What stands alone, or is compared with another number than 0, may be next to nothing and follow its own size all the same; of two that
+        // differ by less than what is followed nobody knows which is larger, and of one that no influence has reached yet not that it is not below 0.
+        let may_be_nothing = |side: Interval| half_width(side, side) > 0.0 || side.magnitude() == 0.0;
         let is_tiny = path.reads_others()
             && width < path.error() * NEXT_TO_NOTHING
-            && half_width(a, a) > 0.0
-            && half_width(b, b) > 0.0;
-        let width = if is_tiny { width.max(self.least_noise(path, atom, at)) } else { width };
+            && may_be_nothing(a)
+            && may_be_nothing(b);
+        let width = if is_tiny { width.max(self.noise_on_the_way(path, atom, at)) } else { width };
         // A wider one is that of a jump.
         let is_jump = || width > FAR * path.error() * a.magnitude().max(b.magnitude()).max(1.0);
         if path.rule.jumping_whole[atom] && is_jump() { 0.0 } else { width }

@@ -1,10 +1,12 @@
 //! Where signs that are zero at an instant go just after it, under the present equations.
 //!
-//! A difference that moves goes with its rate; one that does not is looked at a little later, and so is one that jumps.
+//! A difference that moves goes with its rate; one that does not is looked at a little later, and so is one that jumps. What no influence has reached
+//! yet does not move: its rate is the noise of integration.
 
 use super::EventStage;
 use super::modes::FAR_AWAY;
 use crate::detect::signs::{NEAR, opposite, sign_at_birth};
+use crate::world::path::NEXT_TO_NOTHING;
 use crate::world::state::Signs;
 use dlsys_expr::Dual;
 use dlsys_model::{Rule, Sign};
@@ -38,6 +40,18 @@ impl EventStage<'_, '_> {
         rule.sides.eval(&moving, &mut scratch, &mut out);
         let mut probed = false;
         let reach = self.flows.reach_of(self.world, id).clamp(f64::MIN_POSITIVE, 1e300);
+        let least_way = self.flows.least_of(self.world, id);
+        // What is at rest may seem to move by the noise of those that it reads.
+        let unrest = if least_way > 0.0 {
+            let context = self.world.tree.parameters(id).len()..rule.time_variable();
+            let reads =
+                |variable: &usize| rule.solves.iter().any(|solve| solve.rates.reads().contains(variable));
+            let others = context.filter(reads).map(|variable| moving[variable]).filter(|x| x.rate != 0.0);
+            least_way / NEXT_TO_NOTHING
+                * others.fold(0.0, |most, x| f64::max(most, x.value.abs() + x.rate.abs() * reach))
+        } else {
+            0.0
+        };
         for atom in 0..rule.atoms.len() {
             let (a, b) = (out[2 * atom], out[2 * atom + 1]);
             let slope = a.rate - b.rate;
@@ -53,7 +67,9 @@ impl EventStage<'_, '_> {
                 continue;
             }
             let clear = |slope: f64, least: f64| {
-                if slope.abs() * reach > least * size { Sign::of(slope) } else { Sign::Zero }
+                let way = slope.abs() * reach;
+                let noise = if entry.guess[atom] == Sign::Zero { least_way.max(unrest) } else { least_way };
+                if way > least * size && way > noise { Sign::of(slope) } else { Sign::Zero }
             };
             after[atom] = match (clear(slope, 1e-9), entry.guess[atom]) {
                 (Sign::Zero, guess @ (Sign::Plus | Sign::Minus))

@@ -151,6 +151,7 @@ impl EventStage<'_, '_> {
         let mut out: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
         rule.sides.eval(&self.scratch.variables, &mut self.scratch.registers, &mut out);
         let scale = self.world.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+        let least = if followed.is_some() { self.flows.least_of(self.world, id) } else { 0.0 };
         let mut clear = true;
         let signs = (out.chunks(2).enumerate())
             .map(|(atom, side)| {
@@ -168,6 +169,11 @@ impl EventStage<'_, '_> {
                         && difference.abs() <= noise(rule, atom, &self.scratch.variables, EQUAL)
                 };
                 let equal = size.is_finite() && (difference.abs() <= tolerance * size || is_rounding());
+                // Next to nothing there is no sign but the one that it had.
+                if let Some((signs, _)) = followed.as_ref().filter(|_| !equal && difference.abs() <= least) {
+                    clear = false;
+                    return signs[atom];
+                }
                 // By no more than the error of integration: it goes on with the sign that it had.
                 if let Some((signs, error)) = followed.as_ref().filter(|f| turned && !equal && f.1 > 0.0)
                     && difference.abs() <= noise(rule, atom, &self.scratch.variables, *error)

@@ -29,7 +29,7 @@ use crate::scratch::Scratch;
 use crate::setup::Setup;
 use crate::trajectory::Trajectory;
 use crate::world::neighbours::Neighbours;
-use crate::world::path::Path;
+use crate::world::path::{NEXT_TO_NOTHING, Path};
 use crate::world::state::{Change, Next, NextKind};
 use crate::world::trajectories::{Law, Trajectories};
 use crate::world::{Instant, World};
@@ -100,6 +100,19 @@ impl Flows {
         let own = step.map_or(0.0, |step| step.dense.error);
         let common = if world.coupled.is_some() { self.coupled.control.error } else { 0.0 };
         own.max(common)
+    }
+
+    /// What integration may make of nothing in a module: differences that are no larger have no sign. 0 of one that stands alone, whose values
+    /// are followed to their own accuracy.
+    pub fn least_of(&self, world: &World, id: ModuleId) -> f64 {
+        match world.state(id) {
+            Some(state) if Path::is_among_others(state) => {
+                // Inside a step values may err more than where they come from and go to.
+                let inside = world.coupled.as_ref().map_or(0.0, |solution| solution.error);
+                self.error_of(world, id).max(inside) * NEXT_TO_NOTHING
+            }
+            _ => 0.0,
+        }
     }
 
     /// The time scale of a module's equations, as far as it is known.

@@ -250,14 +250,18 @@ impl<'p> Path<'p> {
         );
     }
 
-    /// The values at a position, those that are integrated with the errors that they have when they are next to nothing.
-    pub fn next_to_nothing(&self, position: f64, out: &mut Vec<Interval>) {
+    /// The values at a position, those that are integrated with the errors that they have when they are next to nothing; if `on_the_way`, to what they
+    /// become in the step: a polynomial through later values errs by a part of these.
+    pub fn next_to_nothing(&self, position: f64, on_the_way: bool, out: &mut Vec<Interval>) {
         let tau = position * self.h;
         let exactly = |x| Interval::constant(x);
         self.each(
             out,
             exactly,
-            |piece| around(piece.value(position), piece.error_of(NEXT_TO_NOTHING)),
+            |piece| {
+                let most = if on_the_way { piece.bounds().magnitude() } else { 0.0 };
+                around(piece.value(position), piece.error_of(NEXT_TO_NOTHING.max(most)))
+            },
             |trajectory, x, offset| exactly(trajectory.at(x, offset + tau)),
             |t| exactly(t + tau),
         );
@@ -265,7 +269,12 @@ impl<'p> Path<'p> {
 
     /// False for modules that stand alone, whose values are followed to their own accuracy however small they are.
     pub fn reads_others(&self) -> bool {
-        self.state.coupled || !self.state.context.context().is_empty()
+        Path::is_among_others(self.state)
+    }
+
+    /// See [`reads_others`](Path::reads_others).
+    pub fn is_among_others(state: &State) -> bool {
+        state.coupled || !state.context.context().is_empty()
     }
 
     /// True if some of these variables is integrated: it follows dense output, or is a sum in which something does.
