@@ -177,7 +177,7 @@ impl Recorder {
         for (carrier, segment) in self.segments.iter().zip(&scene.segments) {
             add(carrier, Moments::of_segment(segment), Form::Rod);
         }
-        let mut known: HashMap<*const Mesh, Moments> = HashMap::new();
+        let mut known = KnownMoments::new();
         for (carrier, surface) in
             self.surfaces.iter().zip(&scene.surfaces).filter(|(c, _)| owner(c).is_some())
         {
@@ -192,6 +192,12 @@ impl Recorder {
         }
     }
 }
+
+/// Moments of meshes about their origins, by their proportions: the largest scale is 1.
+type KnownMoments = HashMap<(*const Mesh, [u64; 3]), Moments>;
+
+/// Proportions are alike that differ by less than a part of this: no more than rounding.
+const PROPORTION: f64 = (1_u64 << 44) as f64;
 
 /// Integrals over a surface or a solid about a point of reference.
 #[derive(Clone, Copy, Debug, Default)]
@@ -221,19 +227,21 @@ impl Moments {
         }
     }
 
-    fn of_mesh(mesh: &Mesh, place: impl Fn(Point) -> Point, origin: Point) -> Moments {
-        let mut moments = Moments::about(origin);
+    /// Of a mesh about its origin, enlarged along its axes.
+    fn of_mesh(mesh: &Mesh, [x, y, z]: [f64; 3]) -> Moments {
+        let mut moments = Moments::about(Point::origin());
+        let place = |corner: u32| {
+            let p = mesh.vertices[corner as usize];
+            Point::new(x * p.x, y * p.y, z * p.z)
+        };
         for face in &mesh.faces {
-            moments.add(face.corners.map(|corner| place(mesh.vertices[corner as usize])));
+            moments.add(face.corners.map(place));
         }
         moments
     }
 
     /// Also the form that it has.
-    fn of_surface(
-        surface: &Surface,
-        known: &mut HashMap<*const Mesh, Moments>,
-    ) -> (Moments, fn(f64) -> Form) {
+    fn of_surface(surface: &Surface, known: &mut KnownMoments) -> (Moments, fn(f64) -> Form) {
         let place = &surface.placement;
         if surface.patches.as_ref().is_some_and(|patches| patches.is_ball()) {
             let [x, y, z] = place.scales.map(|scale| scale / 2.0);
@@ -246,16 +254,16 @@ impl Moments {
             let (first, origin) = (Vector::zeros(), place.origin.coords);
             return (Moments { measure: volume, first, second, faces, origin }, Form::Ball);
         }
-        if !place.is_uniform() {
-            return (Moments::of_mesh(&surface.mesh, |p| place.point(p), place.origin), Form::Surface);
-        }
+        // Surfaces of one shape that grow in proportion differ by one scale.
+        let proportions =
+            place.scales.map(|scale| (scale / place.largest() * PROPORTION).round() / PROPORTION);
         let own = *known
-            .entry(Arc::as_ptr(&surface.mesh))
-            .or_insert_with(|| Moments::of_mesh(&surface.mesh, |p| p, Point::origin()));
+            .entry((Arc::as_ptr(&surface.mesh), proportions.map(f64::to_bits)))
+            .or_insert_with(|| Moments::of_mesh(&surface.mesh, proportions));
         (own.placed(place), Form::Surface)
     }
 
-    /// These moments, of a surface with its origin at 0, after a placement with one scale.
+    /// These moments, of a surface with its origin at 0 and the largest scale 1, after a placement.
     fn placed(&self, place: &Placement) -> Moments {
         let scale = place.largest();
         let axes = Matrix3::from_columns(&place.axes);
