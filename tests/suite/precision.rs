@@ -462,14 +462,11 @@ fn a_level_in_a_value_is_met_together() {
 /// is below zero never takes place, and nothing is in doubt.
 #[test]
 fn empty_cells_are_not_below_zero() {
-    let row = |cells: usize, rate: &str, value: &str, guard: &str| {
-        let cells = "F(0, 0) ".repeat(cells);
+    let row = |rate: &str, value: &str, guard: &str| {
+        let cells = "F_v(0, 0) ".repeat(10);
         format!(
-            "initial string: W(1.446, 0) {cells} W(0.556, 0)\nF(l, p) < F(c, v) > F(r, q):\n solve dc/dt = {rate}, v = {value}\n {guard}"
+            "initial string: F_w(1.446, 0) {cells} F_w(0.556, 0)\nF(l, p) < F_v(c, v) > F(r, q):\n solve dc/dt = {rate}, v = {value}\n {guard}"
         )
-        .replace("W(", "F_w(")
-        .replace("F(0", "F_v(0")
-        .replace("< F(c", "< F_v(c")
     };
     let rates = [
         "0.702*(l + r - 2*c) + 1.332*c + 1.86*abs(r - c) - 0.897*c",
@@ -488,7 +485,7 @@ fn empty_cells_are_not_below_zero() {
                 let settings = Settings { method, tolerance, ..Settings::default() };
                 for (value, guard) in guards {
                     let [with, without] = [guard, ""].map(|guard| {
-                        let text = row(10, rate, value, guard);
+                        let text = row(rate, value, guard);
                         run(&text, settings, &[0.48]).unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"))
                     });
                     let [with, without] = [with, without].map(|mut states| states.swap_remove(0));

@@ -40,15 +40,16 @@ impl EventStage<'_, '_> {
         rule.sides.eval(&moving, &mut scratch, &mut out);
         let mut probed = false;
         let reach = self.flows.reach_of(self.world, id).clamp(f64::MIN_POSITIVE, 1e300);
-        let least_way = self.flows.least_of(self.world, id);
-        // What is at rest may seem to move by the noise of those that it reads.
-        let unrest = if least_way > 0.0 {
+        let error = self.flows.error_among_others(self.world, id);
+        let least_way = error * NEXT_TO_NOTHING;
+        // What has been at rest may seem to move by the noise of those that it reads: its context and its sums.
+        let has_rested = error > 0.0 && entry.guess.contains(&Sign::Zero);
+        let unrest = if has_rested {
             let context = self.world.tree.parameters(id).len()..rule.time_variable();
             let reads =
                 |variable: &usize| rule.solves.iter().any(|solve| solve.rates.reads().contains(variable));
             let others = context.filter(reads).map(|variable| moving[variable]).filter(|x| x.rate != 0.0);
-            least_way / NEXT_TO_NOTHING
-                * others.fold(0.0, |most, x| f64::max(most, x.value.abs() + x.rate.abs() * reach))
+            error * others.map(|x| x.value.abs() + x.rate.abs() * reach).fold(0.0, f64::max)
         } else {
             0.0
         };

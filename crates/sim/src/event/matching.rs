@@ -7,6 +7,7 @@ use super::levels::put_levels;
 use crate::detect::crossing::TOUCH;
 use crate::detect::signs::{EQUAL, NEAR, noise, opposite};
 use crate::world::context::Context;
+use crate::world::path::NEXT_TO_NOTHING;
 use crate::world::state::Signs;
 use dlsys_model::{ContextPart, Pattern, Rule, Sign};
 use dlsys_tree::ModuleId;
@@ -151,7 +152,8 @@ impl EventStage<'_, '_> {
         let mut out: SmallVec<[f64; 16]> = smallvec::smallvec![0.0; rule.sides.outputs()];
         rule.sides.eval(&self.scratch.variables, &mut self.scratch.registers, &mut out);
         let scale = self.world.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()));
-        let least = if followed.is_some() { self.flows.least_of(self.world, id) } else { 0.0 };
+        let error = if followed.is_some() { self.flows.error_among_others(self.world, id) } else { 0.0 };
+        let least = error * NEXT_TO_NOTHING;
         let mut clear = true;
         let signs = (out.chunks(2).enumerate())
             .map(|(atom, side)| {

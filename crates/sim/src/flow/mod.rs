@@ -29,7 +29,7 @@ use crate::scratch::Scratch;
 use crate::setup::Setup;
 use crate::trajectory::Trajectory;
 use crate::world::neighbours::Neighbours;
-use crate::world::path::{NEXT_TO_NOTHING, Path};
+use crate::world::path::Path;
 use crate::world::state::{Change, Next, NextKind};
 use crate::world::trajectories::{Law, Trajectories};
 use crate::world::{Instant, World};
@@ -102,17 +102,14 @@ impl Flows {
         own.max(common)
     }
 
-    /// What integration may make of nothing in a module: differences that are no larger have no sign. 0 of one that stands alone, whose values
-    /// are followed to their own accuracy.
-    pub fn least_of(&self, world: &World, id: ModuleId) -> f64 {
-        match world.state(id) {
-            Some(state) if Path::is_among_others(state) => {
-                // Inside a step values may err more than where they come from and go to.
-                let inside = world.coupled.as_ref().map_or(0.0, |solution| solution.error);
-                self.error_of(world, id).max(inside) * NEXT_TO_NOTHING
-            }
-            _ => 0.0,
+    /// The relative error of the values that a module reads, inside the common step, too; 0 of one that stands alone, whose values are followed to their own
+    /// accuracy. Differences below [`NEXT_TO_NOTHING`](crate::world::path::NEXT_TO_NOTHING) times that have no sign.
+    pub fn error_among_others(&self, world: &World, id: ModuleId) -> f64 {
+        if !world.state(id).is_some_and(Path::is_among_others) {
+            return 0.0;
         }
+        let inside = world.coupled.as_ref().map_or(0.0, |solution| solution.error);
+        self.error_of(world, id).max(inside)
     }
 
     /// The time scale of a module's equations, as far as it is known.
