@@ -31,7 +31,7 @@ const PLACES: usize = 1024;
 const MANY_MISSES: u32 = PLACES as u32;
 /// so many
 const SAMPLE: u32 = 64;
-/// of so many. Where all lives differ, noting how a module stands takes as long as a few evaluations of its rates.
+/// of so many. Where all lives differ, noting how a module stands, and keeping its step, takes as long as some evaluations of its rates.
 const PERIOD: u32 = 1024;
 /// Modules with more parameters are none for which steps are kept: those may be large.
 const MOST_PARAMETERS: usize = 32;
@@ -94,15 +94,25 @@ struct Reading {
     age: bool,
     /// It may have orbits: it is the only rule of its kind.
     is_only: bool,
-    /// Steps in a row that no other had been like.
+    /// Steps in a row that no other had been like, nor on one orbit with.
     misses: u32,
+    /// The instant at which modules that may have orbits were counted last, and whether their steps are looked for then.
+    counted: ([u64; 2], bool),
 }
 
 impl Reading {
-    /// Counts a step. False for one that is not worth being looked for.
-    fn is_worth(&mut self) -> bool {
+    /// Counts a step at an instant. False for one that is not worth being looked for.
+    fn is_worth(&mut self, at: SimTime, may_have_orbit: bool) -> bool {
         self.misses = self.misses.checked_add(1).unwrap_or(MANY_MISSES);
-        self.misses < MANY_MISSES || self.misses % PERIOD < SAMPLE
+        let is_worth = self.misses < MANY_MISSES || self.misses % PERIOD < SAMPLE;
+        if !may_have_orbit {
+            return is_worth;
+        }
+        // Those that are alike at one instant go on alike: all of them by their orbit, or none.
+        if self.counted.0 != at.bits() {
+            self.counted = (at.bits(), is_worth);
+        }
+        self.counted.1
     }
 }
 
@@ -116,7 +126,14 @@ impl KnownSteps {
             let own = both.clone().filter(|variable| **variable < rule.parameters.len().min(MOST_PARAMETERS));
             let parameters = own.fold(0, |all, parameter| all | 1 << parameter);
             let reads = |clock: usize| both.clone().any(|variable| *variable == rule.time_variable() + clock);
-            Reading { parameters, time: reads(0), age: reads(1), is_only, misses: 0 }
+            Reading {
+                parameters,
+                time: reads(0),
+                age: reads(1),
+                is_only,
+                misses: 0,
+                counted: ([u64::MAX; 2], false),
+            }
         };
         let readings = (model.rules.iter().zip(is_only))
             .map(|(rule, only)| rule.solves.iter().map(|solve| reading((rule, only), solve)).collect())
@@ -272,13 +289,12 @@ impl FlowStage<'_, '_> {
         }
         let KnownSteps { readings, now: Standing { words, .. }, orbit, .. } = &mut self.flows.known_steps;
         let reading = &mut readings[index][solve];
-        let is_worth = reading.is_worth();
-        let Reading { parameters, time, age, is_only, .. } = &*reading;
-        let is_timed = *time || self.setup.settings.method.is_fixed_step();
-        let may_have_orbit = *is_only && !is_timed && !*age && state.next.near() == 0;
-        if !is_worth && !may_have_orbit {
+        let is_timed = reading.time || self.setup.settings.method.is_fixed_step();
+        let may_have_orbit = reading.is_only && !is_timed && !reading.age && state.next.near() == 0;
+        if !reading.is_worth(from, may_have_orbit) {
             return None;
         }
+        let Reading { parameters, .. } = &*reading;
         words.clear();
         words.push((index as u64) << 32 | solve as u64);
         words.push((tree.kind(id).index() as u64) << 1 | u64::from(state.numeric_only));
@@ -296,9 +312,6 @@ impl FlowStage<'_, '_> {
         words.extend(state.marks.signs().iter().map(|sign| *sign as u64));
         words.extend(state.marks.switches().iter().map(|on| u64::from(*on)));
         let x = moving.filter(|_| !others);
-        if !is_worth && x.is_none() {
-            return None;
-        }
         let (words, error) = (&words[..], experience.control.error);
         *orbit = x.map(|_| Rests { hash: hash_of(words), words: words.len(), error });
         Some(x)

@@ -99,6 +99,8 @@ struct Independent<'a> {
     time: usize,
     /// Whether the rates read these.
     clocks: [bool; 2],
+    /// The only variable that moves, if there is no other, and no clock is read.
+    only: Option<usize>,
     /// `t` and `age` at the start of the step.
     t: f64,
     age: f64,
@@ -153,7 +155,24 @@ impl<'a> Independent<'a> {
         }
         let (offset, time) = (from.since(state.since), rule.time_variable());
         let clocks = [program.reads().contains(&time), program.reads().contains(&(time + 1))];
-        Independent { solve, program, variables, numeric, formulas, offset, time, clocks, t, age, scratch }
+        let only = match numeric[..] {
+            [only] if formulas.is_empty() && clocks == [false; 2] => Some(only),
+            _ => None,
+        };
+        Independent {
+            solve,
+            program,
+            variables,
+            numeric,
+            formulas,
+            offset,
+            time,
+            clocks,
+            only,
+            t,
+            age,
+            scratch,
+        }
     }
 }
 
@@ -197,10 +216,10 @@ const MAX_TRIES: usize = 100;
 impl Rates for Independent<'_> {
     #[inline]
     fn rates(&mut self, tau: f64, y: &[f64], out: &mut [f64]) {
-        if self.clocks == [false; 2] {
-            self.move_components(tau, y);
-        } else {
-            self.move_to(tau, y);
+        match (self.only, y) {
+            (Some(only), [y]) => self.variables[only] = *y,
+            _ if self.clocks == [false; 2] => self.move_components(tau, y),
+            _ => self.move_to(tau, y),
         }
         self.program.eval_in(&mut self.variables, out);
     }
