@@ -37,7 +37,8 @@ impl<'s> Names<'s> {
                 ids.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
             let mut seen: HashMap<String, usize> = HashMap::new();
             for (i, _) in owners.iter().enumerate().filter(|(_, o)| twice.contains(&o.lineage.id)) {
-                let mut name = names.usual(i);
+                let mut name = String::new();
+                names.push_usual(&mut name, i);
                 let count = seen.entry(name.clone()).or_insert(0);
                 *count += 1;
                 if *count > 1 {
@@ -50,22 +51,29 @@ impl<'s> Names<'s> {
     }
 
     pub(super) fn get(&self, id: OwnerId) -> String {
-        let shared = if self.shared.is_empty() { None } else { self.shared.get(&id.index()) };
-        shared.cloned().unwrap_or_else(|| self.usual(id.index()))
+        let mut name = String::new();
+        self.push(&mut name, id);
+        name
     }
 
-    fn usual(&self, owner: usize) -> String {
+    /// Appends a name.
+    pub(super) fn push(&self, out: &mut String, id: OwnerId) {
+        let shared = if self.shared.is_empty() { None } else { self.shared.get(&id.index()) };
+        match shared {
+            Some(name) => out.push_str(name),
+            None => self.push_usual(out, id.index()),
+        }
+    }
+
+    fn push_usual(&self, out: &mut String, owner: usize) {
         let owner = &self.owners[owner];
         // What is no module, such as the ground, is there once.
         if let Some(name) = owner.name.strip_prefix('=') {
-            return name.to_owned();
+            return out.push_str(name);
         }
-        let kind = self.kinds.get(&*owner.name).map_or("", String::as_str);
-        let mut name = String::with_capacity(kind.len() + 16);
-        name.push_str(kind);
-        name.push(self.separator);
-        name.push_str(&owner.lineage.name());
-        name
+        out.push_str(self.kinds.get(&*owner.name).map_or("", String::as_str));
+        out.push(self.separator);
+        owner.lineage.push_name(out);
     }
 }
 

@@ -13,9 +13,27 @@ pub(super) fn rounded(x: f64, decimals: usize) -> f64 {
 
 /// Appends a number, rounded to so many decimals, without trailing zeros and without a negative zero.
 pub fn push(out: &mut String, x: f64, decimals: usize) {
-    if text::push_quickly(out, x, decimals) {
-        return;
+    if text::push_quickly(out, [x], decimals).is_none() {
+        push_slowly(out, x, decimals);
     }
+}
+
+/// Appends several numbers likewise, with blanks between them. Where they end in `out`.
+pub(super) fn push_row<const N: usize>(out: &mut String, numbers: [f64; N], decimals: usize) -> [usize; N] {
+    text::push_quickly(out, numbers, decimals).unwrap_or_else(|| {
+        let mut is_first = true;
+        numbers.map(|x| {
+            if !std::mem::take(&mut is_first) {
+                out.push(' ');
+            }
+            push(out, x, decimals);
+            out.len()
+        })
+    })
+}
+
+#[cold]
+fn push_slowly(out: &mut String, x: f64, decimals: usize) {
     let start = out.len();
     // Writing to a string does not fail.
     let _ = write!(out, "{x:.decimals$}");

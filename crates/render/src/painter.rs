@@ -109,7 +109,8 @@ impl Painter<'_> {
         for layer in self.layers() {
             id.clear();
             if let Some(names) = &self.names {
-                id.extend([" id=\"", &names.get(layer.owner)]);
+                id.push_str(" id=\"");
+                names.push(&mut id, layer.owner);
                 if layer.ordinal > 1 {
                     let _ = write!(id, ".{}", layer.ordinal);
                 }
@@ -291,9 +292,7 @@ fn area(corners: &[Point]) -> f64 {
 fn add_outline(data: &mut String, corners: &[Point], decimals: usize) {
     let mut place = |p: &Point, command: char| {
         data.push(command);
-        number::push(data, p.x, decimals);
-        data.push(' ');
-        number::push(data, p.y, decimals);
+        number::push_row(data, [p.x, p.y], decimals);
     };
     let command = |i| if i == 0 { 'M' } else { 'L' };
     if area(corners) > 0.0 {

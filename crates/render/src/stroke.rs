@@ -29,6 +29,8 @@ const STRAIGHT: f64 = 0.999_99;
 const OVERLAP: f64 = 0.7;
 /// How much of the next piece a mitred one takes along, in widths.
 const STUB: f64 = 0.2;
+/// Places that are further apart, in units of the picture, are written as different ones.
+const LEAST: f64 = 2e-3;
 /// Bytes that the attributes of a stroke take, mostly.
 const ROOM: usize = 128;
 
@@ -178,8 +180,8 @@ impl<'a> Strokes<'a> {
             segment.widths[i].resolve(fit.default_width) * scale * fit.camera.magnification(z / scale)
         };
         let (wa, wb) = (width(0, a.z), width(1, b.z));
-        let texts = Texts::new([a.x, a.y, b.x, b.y, wa, wb]);
-        let [x1, y1, x2, y2, from, to] = texts.all();
+        let widths = Texts::new([wa, wb]);
+        let [from, to] = widths.all();
         if from == "0" && to == "0" {
             return None;
         }
@@ -200,8 +202,10 @@ impl<'a> Strokes<'a> {
             return outline(tapered([a, end_of_outline()], [wa / 2.0, wb / 2.0], cuts));
         }
         // Not every renderer draws the ends of a stroke without length.
-        if x1 == x2 && y1 == y2 {
-            let attributes = format!(" fill=\"{paint}\" cx=\"{x1}\" cy=\"{y1}\" r=\"{}\"", text(wa / 2.0));
+        let is_dot = || Texts::new([a.x, a.y]).text == Texts::new([b.x, b.y]).text;
+        if (b - a).xy().abs().max() < LEAST && is_dot() {
+            let [x, y, r] = [a.x, a.y, wa / 2.0].map(text);
+            let attributes = format!(" fill=\"{paint}\" cx=\"{x}\" cy=\"{y}\" r=\"{r}\"");
             return Some(Stroke::Element { name: "circle", attributes });
         }
         let mut look = String::with_capacity(ROOM);
@@ -210,11 +214,10 @@ impl<'a> Strokes<'a> {
             let data = self.mitred(ends, [a, end_of_outline()], wa);
             let has_cap = |end| matches!(end, End::Round | End::Joint);
             let cap = if ends.into_iter().any(has_cap) { "" } else { " stroke-linecap=\"butt\"" };
-            let attributes = format!(" fill=\"none\"{look} stroke-linejoin=\"miter\"{cap}");
+            let attributes = [" fill=\"none\"", &look, " stroke-linejoin=\"miter\"", cap].concat();
             return Some(Stroke::Path { attributes, data });
         }
-        let longer;
-        let mut end = [x2, y2];
+        let mut end = b;
         match cuts {
             [None, None] => {}
             [Some(cut), None] => return outline(half_round([a, b], wa / 2.0, cut)),
@@ -223,13 +226,12 @@ impl<'a> Strokes<'a> {
                 return outline(tapered([a, end_of_outline()], [wa / 2.0; 2], cuts));
             }
             [Some(_), Some(_)] => {
-                let place = end_of_outline();
-                longer = Texts::new([place.x, place.y]);
-                end = longer.all();
+                end = end_of_outline();
                 look.push_str(" stroke-linecap=\"butt\"");
             }
         }
-        let [x2, y2] = end;
+        let places = Texts::new([a.x, a.y, end.x, end.y]);
+        let [x1, y1, x2, y2] = places.all();
         if as_path {
             return Some(Stroke::Path {
                 attributes: look,
@@ -273,7 +275,7 @@ impl<'a> Strokes<'a> {
         };
         let [a, b] = places.map(|place| [place.x, place.y]);
         let all = [stub(0), Some(a), Some(b), stub(1)];
-        let mut data = String::new();
+        let mut data = String::with_capacity(ROOM);
         for (number, place) in all.iter().flatten().enumerate() {
             push(&mut data, if number == 0 { "M" } else { "L" }, place);
         }
@@ -308,7 +310,7 @@ impl<'a> Strokes<'a> {
         if light.is_flat() || width * self.style.pixels < HAIR * self.style.scale || length < 1e-3 * width {
             // The mean over the width, by the trapezoidal rule.
             const SHARES: [f64; PLACES.len()] = [0.1125, 0.25, 0.275, 0.25, 0.1125];
-            return lit(strengths.iter().zip(SHARES).map(|(s, share)| s * share).sum()).to_string();
+            return lit(strengths.iter().zip(SHARES).map(|(s, share)| s * share).sum()).hexadecimal();
         }
         // In the picture y goes down; the stem's left is on the left of one who walks along it. The gradient is given on the stem
         // itself: further away its rounded direction would lead past it.
@@ -367,7 +369,7 @@ impl<'a> Strokes<'a> {
     }
 }
 
-/// Some numbers as they are written, in one string.
+/// Some numbers as they are written, in one string, with blanks between them.
 struct Texts<const N: usize> {
     text: String,
     ends: [usize; N],
@@ -376,16 +378,13 @@ struct Texts<const N: usize> {
 impl<const N: usize> Texts<N> {
     fn new(numbers: [f64; N]) -> Texts<N> {
         let mut text = String::with_capacity(ROOM);
-        let ends = numbers.map(|x| {
-            number::push(&mut text, x, DECIMALS);
-            text.len()
-        });
+        let ends = number::push_row(&mut text, numbers, DECIMALS);
         Texts { text, ends }
     }
 
     fn all(&self) -> [&str; N] {
         let mut start = 0;
-        self.ends.map(|end| &self.text[std::mem::replace(&mut start, end)..end])
+        self.ends.map(|end| &self.text[std::mem::replace(&mut start, end + 1)..end])
     }
 }
 
@@ -396,14 +395,9 @@ fn is_smooth(before: &Segment, after: &Segment) -> bool {
 }
 
 /// Appends a command of a path and its numbers.
-fn push(data: &mut String, command: &str, numbers: &[f64]) {
+fn push<const N: usize>(data: &mut String, command: &str, numbers: &[f64; N]) {
     data.push_str(command);
-    for (i, &x) in numbers.iter().enumerate() {
-        if i > 0 {
-            data.push(' ');
-        }
-        number::push(data, x, DECIMALS);
-    }
+    number::push_row(data, *numbers, DECIMALS);
 }
 
 /// The outline of a stroke that begins with a cut, which reaches so far along it, and ends round.

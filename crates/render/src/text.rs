@@ -15,12 +15,10 @@ pub(super) struct Text {
 
 /// Room for a line of six corners, or three numbers, and a few bytes more than that.
 const LINE: usize = 192;
-/// Room for a number.
-const NUMBER: usize = 32;
 
-/// Builds one line, or a number.
-pub(super) struct LineWriter<'t, const SIZE: usize = LINE> {
-    buffer: &'t mut [u8; SIZE],
+/// Builds one line.
+pub(super) struct LineWriter<'t> {
+    buffer: &'t mut [u8; LINE],
     len: usize,
 }
 
@@ -101,18 +99,36 @@ impl Text {
     }
 }
 
-/// Appends a number rounded to so many decimals, as [`number::push`] does, if that is quickly done; else false.
-pub(super) fn push_quickly(out: &mut String, x: f64, decimals: usize) -> bool {
-    let Some(fixed) = POWERS.get(decimals).and_then(|power| Fixed::new(x, *power)) else { return false };
-    let mut buffer = [0; NUMBER];
+/// Appends at most eight numbers, rounded to so many decimals, as [`number::push`] does, with blanks between them, if that is quickly done. Where they
+/// end in `out`; `None` if nothing has been appended.
+#[inline]
+pub(super) fn push_quickly<const N: usize>(
+    out: &mut String,
+    numbers: [f64; N],
+    decimals: usize,
+) -> Option<[usize; N]> {
+    const { assert!(N * (LIMIT.ilog10() as usize + 3) + size_of::<u128>() <= LINE) };
+    let power = POWERS.get(decimals)?;
+    let mut fixed = [Fixed::default(); N];
+    for (fixed, x) in fixed.iter_mut().zip(numbers) {
+        *fixed = Fixed::new(x, *power)?;
+    }
+    let mut buffer = [0; LINE];
     let mut line = LineWriter { buffer: &mut buffer, len: 0 };
-    line.fixed(fixed, decimals);
+    let mut ends = [0; N];
+    for (end, fixed) in ends.iter_mut().zip(fixed) {
+        if line.len > 0 {
+            line.byte(b' ');
+        }
+        line.fixed(fixed, decimals);
+        *end = out.len() + line.len;
+    }
     let len = line.len;
     out.push_str(std::str::from_utf8(&buffer[..len]).unwrap_or_default());
-    true
+    Some(ends)
 }
 
-impl<const SIZE: usize> LineWriter<'_, SIZE> {
+impl LineWriter<'_> {
     pub(super) fn byte(&mut self, byte: u8) {
         self.buffer[self.len] = byte;
         self.len += 1;
@@ -270,8 +286,8 @@ mod tests {
             let expected = format!("before\nvn {x} {y} {z}\n");
             assert_eq!(String::from_utf8_lossy(text.bytes()), expected, "{v:?} {decimals}");
             let mut pushed = String::new();
-            if push_quickly(&mut pushed, v.x, decimals) {
-                assert_eq!(pushed, x);
+            if let Some([first, second]) = push_quickly(&mut pushed, [v.x, v.y], decimals) {
+                assert_eq!((&pushed[..first], &pushed[first + 1..second]), (&x[..], &y[..]));
             }
         };
         let mut state = 1_u64;

@@ -72,8 +72,15 @@ impl Lineage {
 
     /// A name for files: 13 characters, lower case and digits.
     pub fn name(self) -> String {
+        let mut name = String::with_capacity(13);
+        self.push_name(&mut name);
+        name
+    }
+
+    /// Appends the [name](Lineage::name).
+    pub fn push_name(self, out: &mut String) {
         const DIGITS: &[u8; 32] = b"0123456789abcdefghjkmnpqrstvwxyz";
-        (0..13).rev().map(|i| DIGITS[(self.id >> (5 * i) & 31) as usize] as char).collect()
+        out.extend((0..13).rev().map(|i| DIGITS[(self.id >> (5 * i) & 31) as usize] as char));
     }
 }
 

@@ -88,11 +88,16 @@ impl SiblingGroups {
     }
 
     pub fn lineage(&self, number: u32, place: u16) -> Lineage {
+        let (family, first) = self.family(number);
+        family.child(first + usize::from(place))
+    }
+
+    /// What the modules of a group have in common, and the place in the successor at which it begins.
+    pub fn family(&self, number: u32) -> (Family, usize) {
         let SiblingGroup { mixed, trail, .. } = self.all[number as usize];
         let generation = self.generations[number as usize];
         let first = if self.begins.is_empty() { None } else { self.begins.get(&number) };
-        let place = *first.unwrap_or(&0) as usize + usize::from(place);
-        Family { mixed, generation, trail: trail & TRAIL }.child(place)
+        (Family { mixed, generation, trail: trail & TRAIL }, *first.unwrap_or(&0) as usize)
     }
 
     /// Copies all that lookups need; what is needed to add groups is left out.

@@ -1,7 +1,7 @@
 //! The string of modules: the structure at one instant, in string order, as observers get it.
 
 use super::siblings::{NO_GROUP, SiblingGroups};
-use super::{Lineage, SimTime};
+use super::{Family, Lineage, SimTime};
 use dlsys_model::KindId;
 
 /// All modules alive at `time`, in string order, brackets included.
@@ -176,20 +176,54 @@ impl ModuleString {
 
     /// The module or bracket at a place in string order, from 0. Panics beyond [`len`](ModuleString::len).
     pub fn get(&self, index: usize) -> Module<'_> {
-        let StringEntry { kind, first, group, place } = self.entries[index];
-        let end = self.entries.get(index + 1).map_or(self.parameters.len(), |next| next.first as usize);
-        let (birth, lineage) = match (group, place) {
-            // Brackets are no modules: they have no identity and no age.
-            (NO_GROUP, NO_GROUP) => (self.now, Lineage::of_axiom(0)),
-            (NO_GROUP, place) => self.ungrouped[place as usize],
-            _ => (self.groups.birth(group), self.groups.lineage(group, place as u16)),
-        };
-        let parameters = &self.parameters[first as usize..end];
-        Module { kind, parameters, age: self.now.since(birth).max(0.0), lineage }
+        self.module(index, &mut None)
     }
 
     /// All modules and brackets in string order.
     pub fn iter(&self) -> impl Iterator<Item = Module<'_>> {
-        (0..self.len()).map(|i| self.get(i))
+        let mut siblings = None;
+        (0..self.len()).map(move |i| self.module(i, &mut siblings))
     }
+
+    /// The module at a place, given the group of one before it: most have siblings beside them.
+    #[inline]
+    fn module(&self, index: usize, siblings: &mut Option<Siblings>) -> Module<'_> {
+        let StringEntry { kind, first, group, place } = self.entries[index];
+        let end = self.entries.get(index + 1).map_or(self.parameters.len(), |next| next.first as usize);
+        let parameters = &self.parameters[first as usize..end];
+        let (age, lineage) = match (group, place) {
+            // Brackets are no modules: they have no identity and no age.
+            (NO_GROUP, NO_GROUP) => (0.0, Lineage::of_axiom(0)),
+            (NO_GROUP, place) => {
+                let (birth, lineage) = self.ungrouped[place as usize];
+                (self.age_of(birth), lineage)
+            }
+            _ => {
+                let known = match siblings {
+                    Some(known) if known.group == group => *known,
+                    _ => {
+                        let (family, first) = self.groups.family(group);
+                        let age = self.age_of(self.groups.birth(group));
+                        *siblings.insert(Siblings { group, family, first, age })
+                    }
+                };
+                (known.age, known.family.child(known.first + place as usize))
+            }
+        };
+        Module { kind, parameters, age, lineage }
+    }
+
+    fn age_of(&self, birth: SimTime) -> f64 {
+        self.now.since(birth).max(0.0)
+    }
+}
+
+/// What the modules of a group have in common.
+#[derive(Clone, Copy)]
+struct Siblings {
+    group: u32,
+    family: Family,
+    /// The place in the successor at which the group begins.
+    first: usize,
+    age: f64,
 }

@@ -13,7 +13,7 @@ pub fn sin_cos_degrees(angle: f64) -> (f64, f64) {
     if !angle.is_finite() {
         return (f64::NAN, f64::NAN);
     }
-    let reduced = angle % 360.0;
+    let reduced = if angle.abs() < 360.0 { angle } else { angle % 360.0 };
     let quarter = (reduced / 90.0).round();
     // Exact: the two numbers are within a factor of two of each other (Sterbenz), or `quarter` is 0.
     let rest = reduced - 90.0 * quarter;

@@ -47,18 +47,27 @@ impl Color {
         };
         Color { red: shade(r, 0.0), green: shade(g, 0.05), blue: shade(b, 0.15) }
     }
-}
 
-impl fmt::Display for Color {
-    /// `#rrggbb`
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    fn letters(self) -> [u8; 7] {
         const DIGITS: &[u8; 16] = b"0123456789abcdef";
         let mut text = *b"#rrggbb";
         for (digits, channel) in text[1..].chunks_exact_mut(2).zip([self.red, self.green, self.blue]) {
             digits[0] = DIGITS[usize::from(channel >> 4)];
             digits[1] = DIGITS[usize::from(channel & 15)];
         }
-        f.write_str(std::str::from_utf8(&text).unwrap_or_default())
+        text
+    }
+
+    /// `#rrggbb`, as it is displayed; for files with many colours.
+    pub fn hexadecimal(self) -> String {
+        std::str::from_utf8(&self.letters()).unwrap_or_default().to_owned()
+    }
+}
+
+impl fmt::Display for Color {
+    /// `#rrggbb`
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(std::str::from_utf8(&self.letters()).unwrap_or_default())
     }
 }
 

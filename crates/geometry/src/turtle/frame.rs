@@ -32,6 +32,28 @@ pub(super) struct Frame {
     turned: Option<[Twofold; 2]>,
 }
 
+/// Turns that a walk has made, with their results: a plane figure has few directions, to which it comes back again and again.
+#[derive(Default)]
+pub(super) struct Turns {
+    known: [Option<(Turn, [Twofold; 2])>; 1 << Turns::BITS],
+}
+
+#[derive(Clone, Copy, PartialEq)]
+struct Turn {
+    axis: Axis,
+    degrees: f64,
+    moved: [Twofold; 2],
+}
+
+impl Turns {
+    const BITS: u32 = 4;
+
+    /// Where a turn by so many degrees is kept (Fibonacci hashing).
+    fn place(degrees: f64) -> usize {
+        (degrees.to_bits().wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (u64::BITS - Turns::BITS)) as usize
+    }
+}
+
 impl Frame {
     /// Looking up (`+Y`), with the front view's viewer (`+Z`) above.
     pub(super) fn upright() -> Frame {
@@ -46,7 +68,7 @@ impl Frame {
     /// Turns about an axis: left about up, down about left, to the left about heading (the left side goes
     /// down). `degrees` must be finite.
     pub(super) fn turn(&mut self, axis: Axis, degrees: f64) {
-        let degrees = degrees % 360.0;
+        let degrees = reduced(degrees);
         if degrees == 0.0 {
             return;
         }
@@ -54,7 +76,7 @@ impl Frame {
             self.apply();
             self.axis = axis;
         }
-        self.pending = (self.pending + degrees) % 360.0;
+        self.pending = reduced(self.pending + degrees);
         self.turned = None;
     }
 
@@ -79,6 +101,19 @@ impl Frame {
         now.map(|v| v.value())
     }
 
+    /// The same, with what turns like the pending one have led to.
+    pub(super) fn vectors_by(&mut self, turns: &mut Turns) -> [Vector; 3] {
+        if self.pending != 0.0 && self.turned.is_none() {
+            let key = Turn { axis: self.axis, degrees: self.pending, moved: self.moved() };
+            let place = &mut turns.known[Turns::place(self.pending)];
+            self.turned = match place {
+                Some((turn, turned)) if *turn == key => Some(*turned),
+                _ => Some(place.insert((key, self.turned())).1),
+            };
+        }
+        self.vectors()
+    }
+
     /// Rolls until left is horizontal and up is as far up as it can be (`$`; Prusinkiewicz and Lindenmayer
     /// 1990, p. 57). A vertical heading is left as it is.
     pub(super) fn level(&mut self) {
@@ -100,17 +135,21 @@ impl Frame {
         *self = Frame::looking(turned, left, turned.cross(&left));
     }
 
-    /// The vectors that the pending turn moves, after it: the first towards the second.
+    /// The vectors that the pending turn moves: the first towards the second, about the heading the other way.
+    fn moved(&self) -> [Twofold; 2] {
+        match self.axis {
+            Axis::Up => [self.heading, self.left],
+            Axis::Left => [self.up, self.heading],
+            Axis::Heading => [self.left, self.up],
+        }
+    }
+
+    /// The same after the turn.
     fn turned(&mut self) -> [Twofold; 2] {
-        let (pending, axis) = (self.pending, self.axis);
-        let Frame { heading, left, up, .. } = *self;
+        let (pending, axis, [a, b]) = (self.pending, self.axis, self.moved());
         *self.turned.get_or_insert_with(|| {
             let (sin, cos) = sin_cos_degrees(pending);
-            match axis {
-                Axis::Up => Twofold::turned(&heading, &left, (sin, cos)),
-                Axis::Left => Twofold::turned(&up, &heading, (sin, cos)),
-                Axis::Heading => Twofold::turned(&left, &up, (-sin, cos)),
-            }
+            Twofold::turned(&a, &b, (if axis == Axis::Heading { -sin } else { sin }, cos))
         })
     }
 
@@ -128,6 +167,11 @@ impl Frame {
         self.pending = 0.0;
         self.turned = None;
     }
+}
+
+/// An angle modulo 360. A remainder takes a hundred times as long as a comparison.
+fn reduced(degrees: f64) -> f64 {
+    if degrees.abs() < 360.0 { degrees } else { degrees % 360.0 }
 }
 
 #[cfg(test)]
@@ -178,6 +222,19 @@ mod tests {
                 }
             }
             assert_orthonormal(&mut frame);
+        }
+    }
+
+    #[test]
+    fn turns_that_are_known_lead_where_they_led() {
+        let axes = [Axis::Up, Axis::Heading, Axis::Up, Axis::Left, Axis::Up];
+        let (mut frame, mut turns) = (Frame::upright(), Turns::default());
+        for i in 0..20_000_usize {
+            // Long stretches in one plane, with few directions.
+            frame.turn(axes[i / 500 % 5], [30.0, -45.0, 90.0, 137.5][i % 7 % 4]);
+            let mut other = frame;
+            other.turned = None;
+            assert_eq!(frame.vectors_by(&mut turns), other.vectors(), "{i}");
         }
     }
 

@@ -10,7 +10,7 @@ use super::bent::{Bent, Strains};
 use super::body::{self, DrawnBody};
 use super::command::Command;
 use super::error::{self, Error, ErrorKind, Remark, Remarks};
-use super::frame::{Axis, Frame};
+use super::frame::{Axis, Frame, Turns};
 use super::free::{FreePart, Passive, SolidBody};
 use super::patch::OpenPatches;
 use super::skeleton::{Origin, Recorder, Skeleton};
@@ -97,6 +97,7 @@ pub(super) struct Walk<'a> {
     scene: &'a mut Scene,
     state: State,
     stack: Vec<State>,
+    turns: Turns,
     /// The polygons that are open, innermost last.
     polygons: Vec<Outline>,
     patches: OpenPatches,
@@ -159,6 +160,7 @@ impl<'a> Walk<'a> {
                 part: None,
             },
             stack: Vec::new(),
+            turns: Turns::default(),
             polygons: Vec::new(),
             patches: OpenPatches::default(),
             // Without a declaration, gravity.

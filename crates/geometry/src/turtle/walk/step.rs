@@ -21,7 +21,7 @@ impl Walk<'_> {
     /// A step along the heading, drawn if `draw` and if no polygon is open; along an arc where there is a
     /// tropism.
     pub(super) fn step(&mut self, length: f64, draw: bool) -> Result<(), Error> {
-        let [heading, left, _] = self.state.frame.vectors();
+        let [heading, left, _] = self.state.frame.vectors_by(&mut self.turns);
         let length = self.in_range(length)?;
         let has_mass = draw && self.polygons.is_empty() && length != 0.0;
         if self.state.part.is_some() && has_mass && matches!(self.state.width, Width::Default(_)) {
@@ -198,7 +198,7 @@ impl Walk<'_> {
 
     /// Directions of the shape at rest as they are seen.
     pub(super) fn seen_axes(&mut self) -> [Vector; 3] {
-        let axes = self.state.frame.vectors();
+        let axes = self.state.frame.vectors_by(&mut self.turns);
         self.state.bent.map_or(axes, |bent| axes.map(|axis| bent.vector(axis)))
     }
 
