@@ -7,6 +7,8 @@
 //! modes (a, b, c) ──along a──▶ 32 planes of modes (b, c) ──along b──▶ modes c of each line ──along c──▶ values at points
 //! ```
 
+use dlsys_wide::{Kernel, Width};
+
 use crate::lanes::{Complex, Lanes};
 use crate::turns::cos_sin;
 
@@ -70,7 +72,23 @@ impl Transform {
 
     /// The values at the points of the lattice: `Σ F(m) exp(2πi m·n/32)`. Point (a, b, c) is at index (32 a + b) 32 + c.
     pub(crate) fn values(&mut self) -> Box<[Lanes]> {
-        let Transform { modes, planes, plane, roots } = self;
+        self.values_with(Width::widest())
+    }
+
+    /// The same with registers of a width.
+    pub(crate) fn values_with(&mut self, width: Width) -> Box<[Lanes]> {
+        dlsys_wide::run_with(width, Values(self))
+    }
+}
+
+struct Values<'t>(&'t mut Transform);
+
+impl Kernel for Values<'_> {
+    type Output = Box<[Lanes]>;
+
+    #[inline(always)]
+    fn run(self) -> Box<[Lanes]> {
+        let Transform { modes, planes, plane, roots } = self.0;
         let (columns, _) = modes.as_chunks::<USED>();
         for (column, modes) in columns.iter().enumerate() {
             let (b, c) = (column % USED, (column / USED) as i32);
@@ -79,16 +97,17 @@ impl Transform {
                 line(roots, modes, |a, value| planes[a * HALF * USED + column] = value);
             }
         }
-        let mut values = Vec::with_capacity(N * N * N);
+        let mut values = vec![Lanes::default(); N * N * N].into_boxed_slice();
+        let mut lines = values.as_chunks_mut::<N>().0.iter_mut();
         for half in planes.as_chunks::<USED>().0.as_chunks::<HALF>().0 {
             for (c, modes) in half.iter().enumerate() {
                 line(roots, modes, |b, value| plane[b][c] = value);
             }
-            for half in &*plane {
-                values.extend_from_slice(&real_line(roots, half));
+            for (half, line) in plane.iter().zip(&mut lines) {
+                real_line(roots, half, line);
             }
         }
-        values.into_boxed_slice()
+        values
     }
 }
 
@@ -145,7 +164,7 @@ fn line(roots: &[Complex; N], x: &[Complex; USED], mut write: impl FnMut(usize, 
 /// Values at even points become the real, those at odd points the imaginary part of 16 complex values, whose transform has the modes
 /// (1 + i e^(2πi k/32)) F(k) at k modulo 16.
 #[inline(always)]
-fn real_line(roots: &[Complex; N], modes: &[Complex; HALF]) -> [Lanes; N] {
+fn real_line(roots: &[Complex; N], modes: &[Complex; HALF], values: &mut [Lanes; N]) {
     let mut z = [Complex::default(); N / 2];
     let one = Lanes::all(1.0);
     // Mode 0 is real up to rounding.
@@ -166,14 +185,12 @@ fn real_line(roots: &[Complex; N], modes: &[Complex; HALF]) -> [Lanes; N] {
             parts[q][j] = if j * q == 0 { sums[q] } else { sums[q] * roots[2 * j * q] };
         }
     }
-    let mut values = [Lanes::default(); N];
     for (q, part) in parts.into_iter().enumerate() {
         for (r, value) in four(part).into_iter().enumerate() {
             let at = 2 * (q + 4 * r);
             (values[at], values[at + 1]) = (value.re, value.im);
         }
     }
-    values
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! The numbers of eight modes stand next to each other, so that compilers compute with several at once. Phases are reduced to a
 //! turn before anything is made of them, however far the wind has come.
 
+use dlsys_wide::Kernel;
 use nalgebra::Vector3;
 
 use crate::fourier::Transform;
@@ -60,6 +61,7 @@ struct Path {
 
 impl Path {
     /// Drift and decorrelation.
+    #[inline(always)]
     fn both(at: Instant, lap: Option<Lap>) -> [Path; 2] {
         let Lap { drift, swept } = lap.unwrap_or(Lap { drift: 0.0, swept: 0.0 });
         [
@@ -71,6 +73,26 @@ impl Path {
     #[inline(always)]
     fn phase(self, turns: f64) -> f64 {
         turns * self.metres + nearest(turns * self.lap) * self.share
+    }
+}
+
+/// Writes the amplitudes of the potential of groups at an instant into a transform, times a factor.
+pub(crate) struct Amplitudes<'a> {
+    pub(crate) groups: &'a [Group],
+    pub(crate) at: Instant,
+    pub(crate) lap: Option<Lap>,
+    pub(crate) factor: f64,
+    pub(crate) transform: &'a mut Transform,
+}
+
+impl Kernel for Amplitudes<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for group in self.groups {
+            group.write(self.at, self.lap, self.factor, self.transform);
+        }
     }
 }
 
@@ -103,7 +125,7 @@ impl Group {
     }
 
     /// The sums over frequencies: complex amplitudes of both polarisations.
-    #[inline]
+    #[inline(always)]
     fn sums(&self, [drift, swept]: [Path; 2], periodic: bool) -> [Each<f64>; 4] {
         let mut sums = [[0.0; GROUP]; 4];
         for Line { turns, amplitude: [a, b, d, e] } in &self.lines {
@@ -135,7 +157,8 @@ impl Group {
     }
 
     /// Writes the amplitudes of the potential at an instant into a transform, times a factor.
-    pub(crate) fn write(&self, at: Instant, lap: Option<Lap>, factor: f64, transform: &mut Transform) {
+    #[inline(always)]
+    fn write(&self, at: Instant, lap: Option<Lap>, factor: f64, transform: &mut Transform) {
         let [a, b, d, e] = self.sums(Path::both(at, lap), lap.is_some());
         let [p, q] = &self.potential;
         for l in 0..self.count {
@@ -151,7 +174,7 @@ impl Group {
         }
     }
 
-    /// The sums over frequencies of one mode in double precision: the reference for [`Group::write`].
+    /// The sums over frequencies of one mode in double precision: the reference for [`Amplitudes`].
     pub(crate) fn exact(&self, l: usize, at: Instant, lap: Option<Lap>) -> [f64; 4] {
         let [drift, swept] = Path::both(at, lap);
         let drift = drift.phase(self.drift[l]);

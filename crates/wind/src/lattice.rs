@@ -4,9 +4,11 @@
 //! lattice points; the curl is continuous with its first derivatives. (Four-linear interpolation of velocities, as in Stam and Fiume
 //! 1993, section 3.3, keeps 44 % of the energy in the middle of a cell of a 16⁴ lattice and brings 7 % of divergence.)
 
+use dlsys_wide::Kernel;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::fourier::{N, Transform};
+use crate::groups::Amplitudes;
 use crate::lanes::Lanes;
 use crate::modes::{Band, Instant, Lap};
 
@@ -53,7 +55,7 @@ pub(crate) struct Lattice {
 type Weights = [[f64; 4]; 3];
 
 /// Weights at a share `t` of the way from the second point to the third.
-#[inline]
+#[inline(always)]
 fn weights(t: f64) -> Weights {
     let s = 1.0 - t;
     let (t2, s2) = (t * t, s * s);
@@ -83,9 +85,7 @@ impl Lattice {
     ) -> Lattice {
         let spacing = band.period / N as f64;
         transform.clear();
-        for group in &band.groups {
-            group.write(at, lap, amplitude, transform);
-        }
+        dlsys_wide::run(Amplitudes { groups: &band.groups, at, lap, factor: amplitude, transform });
         let coefficients = transform.values();
         let rotation = band.rotation.into_inner();
         Lattice { coefficients, to_lattice: rotation / spacing, to_world: rotation.transpose(), spacing }
@@ -117,39 +117,17 @@ impl Lattice {
     }
 
     /// Indices of the four nearest points along an axis.
-    #[inline]
+    #[inline(always)]
     fn neighbours(cell: usize) -> [usize; 4] {
         [(cell + N - 1) % N, cell % N, (cell + 1) % N, (cell + 2) % N]
     }
 
     /// The first derivatives in the axes of the lattice, and the value if `VALUE`; the rest is left at 0.
-    #[inline(always)]
+    #[inline]
     fn first<const VALUE: bool>(&self, x: Vector3<f64>) -> (Matrix3<f64>, Vector3<f64>) {
         let (cell, share) = self.locate(x);
-        let [wa, wb, wc] = share.map(weights);
-        let [ia, ib, ic] = cell.map(Self::neighbours);
-        let (mut value, mut da, mut db, mut dc) = ([0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]);
-        for i in 0..4 {
-            let (mut plain, mut along_b, mut along_c) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-            for j in 0..4 {
-                let row = self.row(ia[i], ib[j], &ic);
-                let (mut s, mut d) = ([0.0; 4], [0.0; 4]);
-                for k in 0..4 {
-                    add(&mut s, wc[0][k], row[k]);
-                    add(&mut d, wc[1][k], row[k]);
-                }
-                add(&mut plain, wb[0][j], s);
-                add(&mut along_b, wb[1][j], s);
-                add(&mut along_c, wb[0][j], d);
-            }
-            if VALUE {
-                add(&mut value, wa[0][i], plain);
-            }
-            add(&mut da, wa[1][i], plain);
-            add(&mut db, wa[0][i], along_b);
-            add(&mut dc, wa[0][i], along_c);
-        }
-        let first = Matrix3::from_fn(|i, j| [da, db, dc][j][i]);
+        let [value, slopes @ ..] = dlsys_wide::run(First::<VALUE> { lattice: self, cell, share });
+        let first = Matrix3::from_fn(|i, j| slopes[j][i]);
         (first, Vector3::new(value[0], value[1], value[2]))
     }
 
@@ -203,32 +181,7 @@ impl Lattice {
     /// The potential with first and second derivatives at a point in m.
     pub(crate) fn jet(&self, x: Vector3<f64>) -> Jet {
         let (cell, share) = self.locate(x);
-        let [wa, wb, wc] = share.map(weights);
-        let [ia, ib, ic] = cell.map(Self::neighbours);
-        // Sums of products of derivatives of orders (a, b, c), whose sum is at most 2.
-        let mut sums = [[[[0.0; 4]; 3]; 3]; 3];
-        for i in 0..4 {
-            let mut planes = [[[0.0; 4]; 3]; 3];
-            for j in 0..4 {
-                let row = self.row(ia[i], ib[j], &ic);
-                for c in 0..3 {
-                    let mut s = [0.0; 4];
-                    for k in 0..4 {
-                        add(&mut s, wc[c][k], row[k]);
-                    }
-                    for b in 0..3 - c {
-                        add(&mut planes[b][c], wb[b][j], s);
-                    }
-                }
-            }
-            for a in 0..3 {
-                for b in 0..3 - a {
-                    for c in 0..3 - a - b {
-                        add(&mut sums[a][b][c], wa[a][i], planes[b][c]);
-                    }
-                }
-            }
-        }
+        let sums = dlsys_wide::run(Second { lattice: self, cell, share });
         let order = |j: usize, k: usize| {
             let mut order = [0; 3];
             order[j] += 1;
@@ -255,6 +208,86 @@ impl Lattice {
     }
 }
 
+/// The value of a spline in a cell, at a share of the way through it along each axis, if `VALUE`, and its derivatives by the three axes.
+struct First<'l, const VALUE: bool> {
+    lattice: &'l Lattice,
+    cell: [usize; 3],
+    share: [f64; 3],
+}
+
+impl<const VALUE: bool> Kernel for First<'_, VALUE> {
+    type Output = [[f64; 4]; 4];
+
+    #[inline(always)]
+    fn run(self) -> [[f64; 4]; 4] {
+        let [wa, wb, wc] = self.share.map(weights);
+        let [ia, ib, ic] = self.cell.map(Lattice::neighbours);
+        let (mut value, mut da, mut db, mut dc) = ([0.0; 4], [0.0; 4], [0.0; 4], [0.0; 4]);
+        for i in 0..4 {
+            let (mut plain, mut along_b, mut along_c) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+            for j in 0..4 {
+                let row = self.lattice.row(ia[i], ib[j], &ic);
+                let (mut s, mut d) = ([0.0; 4], [0.0; 4]);
+                for k in 0..4 {
+                    add(&mut s, wc[0][k], row[k]);
+                    add(&mut d, wc[1][k], row[k]);
+                }
+                add(&mut plain, wb[0][j], s);
+                add(&mut along_b, wb[1][j], s);
+                add(&mut along_c, wb[0][j], d);
+            }
+            if VALUE {
+                add(&mut value, wa[0][i], plain);
+            }
+            add(&mut da, wa[1][i], plain);
+            add(&mut db, wa[0][i], along_b);
+            add(&mut dc, wa[0][i], along_c);
+        }
+        [value, da, db, dc]
+    }
+}
+
+/// Sums of products of derivatives of orders (a, b, c) along the three axes, whose sum is at most 2.
+struct Second<'l> {
+    lattice: &'l Lattice,
+    cell: [usize; 3],
+    share: [f64; 3],
+}
+
+impl Kernel for Second<'_> {
+    type Output = [[[[f64; 4]; 3]; 3]; 3];
+
+    #[inline(always)]
+    fn run(self) -> [[[[f64; 4]; 3]; 3]; 3] {
+        let [wa, wb, wc] = self.share.map(weights);
+        let [ia, ib, ic] = self.cell.map(Lattice::neighbours);
+        let mut sums = [[[[0.0; 4]; 3]; 3]; 3];
+        for i in 0..4 {
+            let mut planes = [[[0.0; 4]; 3]; 3];
+            for j in 0..4 {
+                let row = self.lattice.row(ia[i], ib[j], &ic);
+                for c in 0..3 {
+                    let mut s = [0.0; 4];
+                    for k in 0..4 {
+                        add(&mut s, wc[c][k], row[k]);
+                    }
+                    for b in 0..3 - c {
+                        add(&mut planes[b][c], wb[b][j], s);
+                    }
+                }
+            }
+            for a in 0..3 {
+                for b in 0..3 - a {
+                    for c in 0..3 - a - b {
+                        add(&mut sums[a][b][c], wa[a][i], planes[b][c]);
+                    }
+                }
+            }
+        }
+        sums
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -268,6 +301,31 @@ mod tests {
         let at = Instant { share: 0.0, drift: 3.5, swept: 0.7 };
         let lattice = Lattice::new(&band, at, None, 1.0, &mut Transform::new());
         (band, lattice, at)
+    }
+
+    /// Whatever the registers of a processor, the wind is the same.
+    #[test]
+    fn all_widths_give_the_same_bits() {
+        let (band, lattice, at) = first_band();
+        let bits = |numbers: &[f64; 4]| numbers.map(f64::to_bits);
+        let of = |width| {
+            let mut transform = Transform::new();
+            let groups = &band.groups;
+            let amplitudes = Amplitudes { groups, at, lap: None, factor: 1.0, transform: &mut transform };
+            dlsys_wide::run_with(width, amplitudes);
+            let values = transform.values_with(width).iter().map(|lanes| bits(&lanes.0)).collect::<Vec<_>>();
+            let (cell, share) = lattice.locate(Vector3::new(0.3, 1.7, -2.9));
+            let first = dlsys_wide::run_with(width, First::<true> { lattice: &lattice, cell, share });
+            let second = dlsys_wide::run_with(width, Second { lattice: &lattice, cell, share });
+            let second = second.as_flattened().as_flattened().iter().map(bits).collect::<Vec<_>>();
+            (values, first.each_ref().map(bits), second)
+        };
+        let [least, others @ ..] = dlsys_wide::Width::ALL;
+        let expected = of(least);
+        assert!(expected.0.iter().zip(&lattice.coefficients).all(|(a, b)| *a == bits(&b.0)));
+        for width in others {
+            assert!(of(width) == expected, "{width:?}");
+        }
     }
 
     /// The transform against the sum of the modes. After 4,000 km, the phases of the shortest modes have lost seven digits.

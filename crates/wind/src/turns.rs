@@ -81,7 +81,12 @@ const fn inverse_factorials<const N: usize>(first: usize) -> [f64; N] {
 /// `Σ terms_i b^i`.
 #[inline(always)]
 fn series<const N: usize>(b: f64, terms: [f64; N]) -> f64 {
-    terms.iter().rev().fold(0.0, |sum, term| sum * b + term)
+    let mut sum = 0.0;
+    // Adapters of iterators would be functions of their own, built for narrow registers.
+    for i in (0..N).rev() {
+        sum = sum * b + terms[i];
+    }
+    sum
 }
 
 #[cfg(test)]
