@@ -5,7 +5,7 @@ use std::process::Command;
 
 use dlsys::sim::Method;
 use dlsys_fuzz::TARGETS;
-use dlsys_fuzz::accuracy::{Trial, Verdict};
+use dlsys_fuzz::accuracy::{Accuracy, Judged, Trial, Verdict, random};
 
 #[test]
 fn no_target_panics_on_some_inputs() {
@@ -26,11 +26,11 @@ fn no_target_panics_on_some_inputs() {
 fn random_models_agree_with_another_way_of_solving_them() {
     let mut right = 0;
     for seed in 0..40 {
-        let trial = Trial::new(seed);
+        let trial = random(seed);
         match trial.judge() {
             Verdict::Right(_) => right += 1,
             Verdict::Open | Verdict::Refused(_) => {}
-            Verdict::Wrong(why) => panic!("{seed}: {why}\n{}", trial.plant.text()),
+            Verdict::Wrong(why) => panic!("{seed}: {why}\n{}", trial.text()),
         }
     }
     assert!(right >= 15, "{right} of 40 are compared");
@@ -39,8 +39,8 @@ fn random_models_agree_with_another_way_of_solving_them() {
 /// The first order of Euler's method is not within the tolerance.
 #[test]
 fn wrong_states_are_noticed() {
-    let verdicts =
-        (0..20).map(|seed| Trial { method: Method::Euler, tolerance: 1e-8, ..Trial::new(seed) }.judge());
+    let accuracy = Accuracy { method: Method::Euler, tolerance: 1e-8 };
+    let verdicts = (0..20).map(|seed| Trial { accuracy, ..Trial::new(seed) }.judge());
     let wrong = verdicts.filter(|verdict| matches!(verdict, Verdict::Wrong(_))).count();
     assert!(wrong >= 5, "{wrong} of 20 are wrong");
 }

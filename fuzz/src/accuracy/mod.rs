@@ -2,8 +2,10 @@
 //!
 //! A model is a row or a tree of cells that are replaced when a condition becomes true ([`plant`]). [`reference`](mod@reference) solves the same equations with
 //! small steps of the classical Runge-Kutta method and its own reading of what an event is; nothing of dlsys takes part in
-//! that. Where the answer hangs on less than the errors of either, there is no verdict.
+//! that. Where the answer hangs on less than the errors of either, there is no verdict. Rows of cells that are empty at first ([`empty`]) are
+//! compared with themselves, for there every sign hangs on less than that.
 
+pub mod empty;
 pub mod expression;
 pub mod plant;
 pub mod reference;
@@ -14,6 +16,7 @@ use dlsys::session::Session;
 use dlsys::sim::{Method, Settings};
 use dlsys::tree::ModuleString;
 
+use empty::EmptyRow;
 use plant::Plant;
 use reference::{Course, solve};
 
@@ -39,30 +42,48 @@ pub enum Verdict {
     Wrong(String),
 }
 
-/// A model with the settings of its run.
-pub struct Trial {
-    pub plant: Plant,
+/// A model, and how it is run, whose result can be judged.
+pub trait Judged {
+    /// The model in the language.
+    fn text(&self) -> String;
+    /// The command that shows the result of a file.
+    fn command(&self, file: &str) -> String;
+    fn judge(&self) -> Verdict;
+}
+
+/// A model of any kind, the same for the same seed.
+pub fn random(seed: u64) -> Box<dyn Judged> {
+    match seed % 4 {
+        3 => Box::new(EmptyRow::new(seed)),
+        _ => Box::new(Trial::new(seed)),
+    }
+}
+
+fn dice(seed: u64) -> Dice {
+    let mut dice = Dice::new(seed.wrapping_add(1));
+    // Seeds that are near each other begin alike.
+    for _ in 0..8 {
+        dice.roll(2);
+    }
+    dice
+}
+
+/// Method and tolerance of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Accuracy {
     pub method: Method,
     pub tolerance: f64,
 }
 
-impl Trial {
-    /// The same for the same seed.
-    pub fn new(seed: u64) -> Trial {
-        let mut dice = Dice::new(seed.wrapping_add(1));
-        // Seeds that are near each other begin alike.
-        for _ in 0..8 {
-            dice.roll(2);
-        }
-        let plant = Plant::random(&mut dice);
+impl Accuracy {
+    fn random(dice: &mut Dice) -> Accuracy {
         let method = dice.pick(&[Method::Auto, Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau]);
         let tolerance = dice.pick(&[1e-4, 1e-6, 1e-6, 1e-8]);
-        Trial { plant, method, tolerance }
+        Accuracy { method, tolerance }
     }
 
-    /// The command that shows the result of a file.
-    pub fn command(&self, file: &str) -> String {
-        let times: Vec<String> = self.plant.times.iter().map(f64::to_string).collect();
+    fn command(self, file: &str, times: &[f64]) -> String {
+        let times: Vec<String> = times.iter().map(f64::to_string).collect();
         let method = format!("{:?}", self.method).to_lowercase();
         format!(
             "dlsys run {file} --method {method} --tolerance {:e} --at {}",
@@ -71,7 +92,47 @@ impl Trial {
         )
     }
 
-    pub fn judge(&self) -> Verdict {
+    /// What dlsys gives at some times.
+    fn run(self, text: &str, times: &[f64]) -> Result<Vec<ModuleString>, String> {
+        let session = Session::from_text("input.dls", text, &[]).map_err(|refused| {
+            refused.diagnostics.iter().map(|d| d.render(&refused.source, false)).collect::<String>()
+        })?;
+        let Accuracy { method, tolerance } = self;
+        let settings = Settings { method, tolerance, max_seconds: LIMIT, ..Settings::default() };
+        let mut simulation = session.simulate(settings).map_err(|e| e.to_string())?;
+        let state = |t: &f64| {
+            let mut string = ModuleString::default();
+            simulation.at(*t, &mut string).map_err(|e| e.to_string())?;
+            Ok(string)
+        };
+        times.iter().map(state).collect()
+    }
+}
+
+/// A plant with the settings of its run, which is compared with the reference.
+pub struct Trial {
+    pub plant: Plant,
+    pub accuracy: Accuracy,
+}
+
+impl Trial {
+    pub fn new(seed: u64) -> Trial {
+        let mut dice = dice(seed);
+        let plant = Plant::random(&mut dice);
+        Trial { plant, accuracy: Accuracy::random(&mut dice) }
+    }
+}
+
+impl Judged for Trial {
+    fn text(&self) -> String {
+        self.plant.text()
+    }
+
+    fn command(&self, file: &str) -> String {
+        self.accuracy.command(file, &self.plant.times)
+    }
+
+    fn judge(&self) -> Verdict {
         let plant = &self.plant;
         let [best, coarse] = STEPS.map(|steps| solve(plant, steps, 0.0));
         let nudged = solve(plant, STEPS[1], NUDGE);
@@ -85,7 +146,7 @@ impl Trial {
         if known == 0 {
             return Verdict::Open;
         }
-        let found = match self.run(known) {
+        let found = match self.accuracy.run(&plant.text(), &plant.times[..known]) {
             Ok(found) => found,
             // Its condition is not one that the equations hold for: the reference has no such thing.
             Err(message) if message.contains("is born outside its domain") => return Verdict::Open,
@@ -102,26 +163,9 @@ impl Trial {
         }
         Verdict::Right(known)
     }
+}
 
-    /// What dlsys gives at the first times.
-    fn run(&self, count: usize) -> Result<Vec<ModuleString>, String> {
-        let text = self.plant.text();
-        let session = Session::from_text("input.dls", &text, &[]).map_err(|refused| {
-            refused.diagnostics.iter().map(|d| d.render(&refused.source, false)).collect::<String>()
-        })?;
-        let Trial { method, tolerance, .. } = *self;
-        let settings = Settings { method, tolerance, max_seconds: LIMIT, ..Settings::default() };
-        let mut simulation = session.simulate(settings).map_err(|e| e.to_string())?;
-        self.plant.times[..count]
-            .iter()
-            .map(|t| {
-                let mut string = ModuleString::default();
-                simulation.at(*t, &mut string).map_err(|e| e.to_string())?;
-                Ok(string)
-            })
-            .collect()
-    }
-
+impl Trial {
     /// The first parameter at a time that is wrong.
     fn difference(
         &self,
@@ -137,13 +181,14 @@ impl Trial {
         let growth = (spread(nudged) / NUDGE).max(1.0);
         for (cell, (found, wanted)) in found.iter().zip(&best.states[at]).enumerate() {
             for (name, (found, wanted)) in ["x", "c", "v"].iter().zip(found.iter().zip(wanted)) {
-                let bound = RIGHT * self.tolerance * growth * wanted.abs().max(1.0) + 10.0 * spread(coarse);
+                let bound =
+                    RIGHT * self.accuracy.tolerance * growth * wanted.abs().max(1.0) + 10.0 * spread(coarse);
                 let error = (found - wanted).abs();
                 if error.is_nan() || error > bound {
                     return Some(format!(
                         "t = {}, cell {cell}: {name} = {found}, not {wanted}: {:.0} times the tolerance, where a difference grows {growth:.1} times",
                         self.plant.times[at],
-                        error / self.tolerance
+                        error / self.accuracy.tolerance
                     ));
                 }
             }

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use dlsys_fuzz::Options;
-use dlsys_fuzz::accuracy::{Trial, Verdict};
+use dlsys_fuzz::accuracy::{Verdict, random};
 
 /// Numbers of models for one seed.
 const NUMBERS: u64 = 1 << 32;
@@ -20,10 +20,10 @@ fn main() {
         "--only" => only = Some(value().parse::<u64>().expect("--only N")),
         other => panic!("`{other}` is none of --seconds, --count, --seed, --only"),
     });
-    let trial = |number: u64| Trial::new(seed.wrapping_mul(NUMBERS).wrapping_add(number));
+    let trial = |number: u64| random(seed.wrapping_mul(NUMBERS).wrapping_add(number));
     if let Some(number) = only {
         let trial = trial(number);
-        println!("{}\n# {}\n# {:?}", trial.plant.text(), trial.command("FILE"), trial.judge());
+        println!("{}\n# {}\n# {:?}", trial.text(), trial.command("FILE"), trial.judge());
         return;
     }
     let begun = Instant::now();
@@ -47,7 +47,7 @@ fn main() {
                 wrong += 1;
                 let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("found");
                 let path = folder.join(format!("accuracy-{seed}-{count}.dls"));
-                let text = format!("# {why}\n# {}\n{}", trial.command("FILE"), trial.plant.text());
+                let text = format!("# {why}\n# {}\n{}", trial.command("FILE"), trial.text());
                 let _ = std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(&path, text));
                 eprintln!("wrong: {}\n  {why}", path.display());
             }
