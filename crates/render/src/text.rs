@@ -107,7 +107,7 @@ pub(super) fn push_quickly<const N: usize>(
     numbers: [f64; N],
     decimals: usize,
 ) -> Option<[usize; N]> {
-    const { assert!(N * (LIMIT.ilog10() as usize + 3) + size_of::<u128>() <= LINE) };
+    const { assert!(N * (LIMIT.ilog10() as usize + 3) + 2 * size_of::<u64>() <= LINE) };
     let power = POWERS.get(decimals)?;
     let mut fixed = [Fixed::default(); N];
     for (fixed, x) in fixed.iter_mut().zip(numbers) {
@@ -149,6 +149,7 @@ impl LineWriter<'_> {
         self.byte(b'\n');
     }
 
+    #[inline]
     fn fixed(&mut self, number: Fixed, decimals: usize) {
         self.buffer[self.len] = b'-';
         let start = self.len + usize::from(number.negative);
@@ -157,12 +158,19 @@ impl LineWriter<'_> {
         let whole = 8 - decimals;
         let skipped = (digits.trailing_zeros() as usize / 8).min(whole - 1);
         let behind = decimals.saturating_sub(digits.leading_zeros() as usize / 8);
-        let width = whole - skipped;
-        let ascii = u128::from(digits | ZEROS);
-        let front = ascii >> (8 * skipped) & ((1 << (8 * width)) - 1);
-        let text = front | u128::from(b'.') << (8 * width) | ascii >> (8 * whole) << (8 * width + 8);
-        self.buffer[start..start + 16].copy_from_slice(&text.to_le_bytes());
-        self.len = start + width + if behind > 0 { behind + 1 } else { 0 };
+        let (ascii, point) = (digits | ZEROS, start + whole - skipped);
+        self.eight(start, ascii >> (8 * skipped));
+        self.len = point;
+        if behind > 0 {
+            self.buffer[point] = b'.';
+            self.eight(point + 1, ascii >> (8 * whole));
+            self.len = point + 1 + behind;
+        }
+    }
+
+    /// Writes eight bytes at a place, the lowest first; what is not needed of them is written over.
+    fn eight(&mut self, place: usize, bytes: u64) {
+        self.buffer[place..place + 8].copy_from_slice(&bytes.to_le_bytes());
     }
 }
 
