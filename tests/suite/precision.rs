@@ -458,6 +458,43 @@ fn a_level_in_a_value_is_met_together() {
     }
 }
 
+/// Two cells approach one equilibrium from two sides and never meet. The errors of integration, or rounding, make them cross at last, and a switch that
+/// asks which is larger would drive them apart for good.
+#[test]
+fn cells_with_one_equilibrium_keep_their_order() {
+    let text = |rate: &str, more: &str| {
+        format!(
+            "initial string: W(0.5) F(1.353) F(0.322)\nW(l) < F(c): solve dc/dt = {rate}\nF(l) < F(c): solve dc/dt = {rate} + {more}"
+        )
+    };
+    for rate in ["1 - c", "1 - c^3", "2*sin(c) - 1.68294196961579301*c", "c - c^3"] {
+        for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau] {
+            for tolerance in [1e-3, 1e-4, 1e-5, 1e-6, 1e-8] {
+                let settings = Settings { method, tolerance, ..Settings::default() };
+                let text = text(rate, "(if l > c then 0 else 0.5)");
+                let found = run(&text, settings, &[8.0, 20.0, 100.0])
+                    .unwrap_or_else(|e| panic!("{method:?} {tolerance:e}: {e}"));
+                for string in &found {
+                    let [a, b] = [1, 2].map(|cell| string[cell].1[0]);
+                    let is_near = [a, b].iter().all(|c| (c - 1.0).abs() < 10.0 * tolerance + 0.05);
+                    assert!(is_near, "{rate}, {method:?} {tolerance:e}: {a}, {b}");
+                }
+            }
+        }
+    }
+    // One that overtakes the other does so, however slowly it comes.
+    for (more, tolerance) in [(1e-2, 1e-4), (1e-4, 1e-6), (1e-6, 1e-9)] {
+        for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau] {
+            let settings = Settings { method, tolerance, ..Settings::default() };
+            let text = text("1 - c^3", &format!("{more} + (if l > c then 0 else 0.5)"));
+            let found =
+                run(&text, settings, &[20.0]).unwrap_or_else(|e| panic!("{method:?} {tolerance:e}: {e}"));
+            let (c, wanted) = (found[0][2].1[0], (1.5_f64 + more).cbrt());
+            assert!((c - wanted).abs() < 100.0 * tolerance, "{more}, {method:?} {tolerance:e}: {c}");
+        }
+    }
+}
+
 /// Cells that no influence has reached yet are not below zero, though the polynomials of integration are, by their noise: a production for what
 /// is below zero never takes place, and nothing is in doubt.
 #[test]

@@ -12,7 +12,9 @@
 //!   production depends on it, that is reported ([`Error::InDoubt`](crate::error::Error::InDoubt)).
 //!
 //! A touch to the last digits counts as one. All this is for productions only: conditions inside equations change
-//! where the integrated values change them, or else pieces of equations would be continued beyond their ends.
+//! where the integrated values change them, or else pieces of equations would be continued beyond their ends. But one that makes rates jump so that the
+//! sides, which had come to rest, part on the other side, keeps its sign within the band
+//! ([`crosses_by_error`](CrossingDetector::crosses_by_error)).
 //!
 //! Two modules, one of which reads the other, may have simultaneous events whose integrated instants differ; the second
 //! would then see the successors of the first. So when a module has its event, the events of those of its readers that
@@ -21,6 +23,7 @@
 
 use crate::detect::crossing::{Crossing, CrossingDetector};
 use crate::detect::signs::{half_width, opposite, sign_of};
+use crate::detect::switched;
 use crate::world::path::{NEXT_TO_NOTHING, Path};
 use dlsys_expr::{Dual, Interval, Value};
 use dlsys_model::{Sign, ZeroCrossing};
@@ -31,6 +34,9 @@ const NEARBY: f64 = 1e-6;
 
 /// A difference that is never slower, on its way through the band, than this part of its mean rate passes zero.
 const STEADY: f64 = 0.5;
+
+/// Sides that part so many times faster than they have come together had all but come to rest.
+const SLOW: f64 = 10.0;
 
 /// A difference that is this many times larger than the error of its sides lies surely outside the band.
 pub const FAR: f64 = 1e3;
@@ -176,7 +182,10 @@ impl CrossingDetector {
             Some(crossing) if crossing.at != Sign::Zero || crossing.after != opposite(sign) => {
                 return Lookahead::crossing(next);
             }
-            _ if !query.decides => return Lookahead::crossing(next),
+            _ if !query.decides => {
+                let near = query.near && next.is_none() && self.is_near(path, atom, limit);
+                return Lookahead { next, near, doubt: None };
+            }
             Some(crossing) => crossing.position,
             None => limit,
         };
@@ -201,6 +210,11 @@ impl CrossingDetector {
             Some(ahead) => ahead,
             None => self.confirm(path, query, next, crossing, noise),
         }
+    }
+
+    /// True if the difference is inside the band at a position.
+    fn is_near(&mut self, path: &Path, atom: usize, at: f64) -> bool {
+        self.difference(path, atom).value(at).abs() <= self.noise(path, atom, at)
     }
 
     /// From inside the band: the crossing, the doubt or the stay that follows. None if the difference leaves the band
@@ -320,6 +334,42 @@ impl CrossingDetector {
             }
             _ => Lookahead::ends_near(true),
         }
+    }
+
+    /// What lies ahead instead, if a crossing of sides that approach each other without limit (two cells with one equilibrium) is one of the error of
+    /// integration, or of rounding, and the equations would take it for a reason to part: a switch makes the rates jump that way, many times faster than
+    /// the sides have come. They stay near each other.
+    pub(super) fn crosses_by_error(
+        &mut self,
+        path: &Path,
+        query: AtomQuery,
+        crossing: Crossing,
+        now: &[Sign],
+    ) -> Option<Lookahead> {
+        let AtomQuery { atom, sign, tolerance, .. } = query;
+        let Crossing { position, at, after, .. } = crossing;
+        let around = path.rule.reads_context && !path.state.context.is_empty();
+        // Rounding may make values of neighbours equal at last.
+        let ends_equal = around && after == Sign::Zero && matches!(sign, Sign::Plus | Sign::Minus);
+        if at != Sign::Zero || after != opposite(sign) && !ends_equal {
+            return None;
+        }
+        let change = switched::change_of_rate(path, atom, position, now, after)?;
+        let (lo, hi) = ((position - NEARBY).max(0.0), (position + NEARBY).min(1.0));
+        let rate = self.difference(path, atom).bounds(lo, hi).rate;
+        if -sign_of(sign) * change <= SLOW * rate.magnitude() {
+            return None;
+        }
+        let noise = self.noise(path, atom, position);
+        let band = if around { noise.max(BLUR * tolerance) } else { noise };
+        if band <= tolerance {
+            return None;
+        }
+        let ahead = self.confirm(path, query, Some(crossing), position, band);
+        // What is known to the last digits touches where it seems to.
+        let is_uncertain = noise > tolerance;
+        let stays = ahead.next.is_none() && (is_uncertain || ahead.near);
+        stays.then(|| Lookahead::ends_near(is_uncertain))
     }
 
     /// True if the difference comes from outside the band on this path and crosses zero, at the limit, at a steady

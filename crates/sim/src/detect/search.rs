@@ -250,6 +250,10 @@ impl Search<'_, '_> {
             }
             let Some(first) = first else { break };
             self.rounds += 1;
+            if let Some((index, ahead)) = self.by_error(first) {
+                self.tracked[index].ahead = ahead;
+                continue;
+            }
             let Coincidence { at, after, mut group } = self.coincidence(first);
             // A condition that oscillates without end is cut into short stretches, each of bounded work.
             if matters(self.path.rule, self.path.state, &at, &after) || self.rounds > MAX_ROUNDS {
@@ -266,6 +270,20 @@ impl Search<'_, '_> {
             result.near |= 1 << tracked.atom;
         }
         result
+    }
+
+    /// The tracked atom, by its index, that crosses first, if it does so by an error only and keeps its sign, and what lies ahead of it then.
+    fn by_error(&mut self, first: Crossing) -> Option<(usize, Lookahead)> {
+        let is_first = |t: &TrackedAtom| t.ahead.next.is_some_and(|c| c.position == first.position);
+        let index = self.tracked.iter().position(is_first)?;
+        let TrackedAtom { atom, tolerance, .. } = self.tracked[index];
+        let decides = || produces(self.path.rule, &self.now, atom) || switched::may_decide(self.path, atom);
+        if self.tracked[index].is_exact() || decides() {
+            return None;
+        }
+        let (limit, sign, error) = (self.limit, self.now[atom], self.error);
+        let query = AtomQuery { atom, from: 0.0, limit, sign, tolerance, near: false, decides: false, error };
+        Some((index, self.detector.crosses_by_error(self.path, query, first, &self.now)?))
     }
 
     /// The tracked atom with the earliest doubt, by its index, and the position of that.

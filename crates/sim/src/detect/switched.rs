@@ -4,6 +4,7 @@ use smallvec::SmallVec;
 
 use crate::detect::signs::opposite;
 use crate::world::path::Path;
+use dlsys_expr::{Dual, Value};
 use dlsys_model::{Rule, Sign, Solve, Truth};
 
 /// The active equations, if a switch in them asks for an atom, and the condition of a production reads a value with such switches.
@@ -28,6 +29,36 @@ fn read<'r>(rule: &'r Rule, solve: &'r Solve) -> impl Iterator<Item = usize> + u
 /// True if a production may follow, by way of a value, when the sides of an atom meet.
 pub fn may_decide(path: &Path, atom: usize) -> bool {
     clause(path, atom).is_some()
+}
+
+/// How the rate of the difference of an atom's sides changes at a position, per unit of position, when the atom's sign becomes another; None if
+/// more follows from that than other switches of the equations that are active.
+pub fn change_of_rate(path: &Path, atom: usize, position: f64, now: &[Sign], after: Sign) -> Option<f64> {
+    let (rule, active) = (path.rule, path.state.solve.get()?);
+    let solve = &rule.solves[active];
+    if !solve.switches.iter().any(|s| s.condition.atoms().any(|(other, _)| other == atom)) {
+        return None;
+    }
+    let after = |other: usize| if other == atom { after } else { now[other] };
+    if rule.solves.iter().position(|s| s.guard.judge(after) == Truth::Yes) != Some(active) {
+        return None;
+    }
+    let mut values = Vec::new();
+    path.everything_at(position, &mut values);
+    let (mut scratch, mut rates) = (Vec::new(), [(); 2].map(|()| vec![0.0; solve.rates.outputs()]));
+    solve.rates.eval(&values, &mut scratch, &mut rates[0]);
+    for (value, switch) in values[rule.variables..].iter_mut().zip(&solve.switches) {
+        *value = f64::from(u8::from(switch.condition.judge(after) != Truth::No));
+    }
+    solve.rates.eval(&values, &mut scratch, &mut rates[1]);
+    values.truncate(rule.variables);
+    let mut moved: Vec<Dual<f64>> = values.into_iter().map(Dual::constant).collect();
+    for ((parameter, before), after) in solve.of.iter().zip(&rates[0]).zip(&rates[1]) {
+        moved[*parameter].rate = after - before;
+    }
+    let mut sides = vec![Dual::constant(0.0); rule.sides.outputs()];
+    rule.sides.eval(&moved, &mut Vec::new(), &mut sides);
+    Some((sides[2 * atom].rate - sides[2 * atom + 1].rate) * path.h)
 }
 
 /// True if a production holds at a position with the value that comes when the sides of an atom meet, and not with the one before.
