@@ -357,7 +357,9 @@ impl CrossingDetector {
         let change = switched::change_of_rate(path, atom, position, now, after)?;
         let (lo, hi) = ((position - NEARBY).max(0.0), (position + NEARBY).min(1.0));
         let rate = self.difference(path, atom).bounds(lo, hi).rate;
-        if -sign_of(sign) * change <= SLOW * rate.magnitude() {
+        let parts = -sign_of(sign) * change > SLOW * rate.magnitude();
+        // Equations that end where they change are not continued.
+        if !parts || !switched::is_defined(path, query.limit) {
             return None;
         }
         let noise = self.noise(path, atom, position);

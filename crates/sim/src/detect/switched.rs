@@ -61,6 +61,15 @@ pub fn change_of_rate(path: &Path, atom: usize, position: f64, now: &[Sign], aft
     Some((sides[2 * atom].rate - sides[2 * atom + 1].rate) * path.h)
 }
 
+/// True if the active equations, with their present switches, have rates at a position.
+pub fn is_defined(path: &Path, position: f64) -> bool {
+    let Some(solve) = path.state.solve.get().map(|active| &path.rule.solves[active]) else { return true };
+    let (mut values, mut rates) = (Vec::new(), vec![0.0; solve.rates.outputs()]);
+    path.everything_at(position, &mut values);
+    solve.rates.eval(&values, &mut Vec::new(), &mut rates);
+    rates.iter().all(|rate| rate.is_finite())
+}
+
 /// True if a production holds at a position with the value that comes when the sides of an atom meet, and not with the one before.
 pub fn decides(path: &Path, atom: usize, position: f64, now: &[Sign]) -> bool {
     let Some(solve) = clause(path, atom) else { return false };
