@@ -13,7 +13,7 @@ pub fn sin_cos_degrees(angle: f64) -> (f64, f64) {
     if !angle.is_finite() {
         return (f64::NAN, f64::NAN);
     }
-    let reduced = if angle.abs() < 360.0 { angle } else { angle % 360.0 };
+    let reduced = reduced(angle);
     let quarter = (reduced / 90.0).round();
     // Exact: the two numbers are within a factor of two of each other (Sterbenz), or `quarter` is 0.
     let rest = reduced - 90.0 * quarter;
@@ -24,6 +24,11 @@ pub fn sin_cos_degrees(angle: f64) -> (f64, f64) {
         2 => (-sin, -cos),
         _ => (-cos, sin),
     }
+}
+
+/// An angle in degrees modulo 360. A remainder takes many times as long as a comparison.
+pub(crate) fn reduced(degrees: f64) -> f64 {
+    if degrees.abs() < 360.0 { degrees } else { degrees % 360.0 }
 }
 
 /// The same for `-45 ..= 45`.

@@ -33,6 +33,7 @@ mod sheet;
 mod surroundings;
 
 pub use bounds::Bounds;
+pub(crate) use degrees::reduced;
 pub use degrees::sin_cos_degrees;
 pub use dlsys_model::{Drawn, Footprint, Picture, Texture};
 pub use element::{Placement, Polygon, Segment, Surface, Width};

@@ -8,7 +8,7 @@
 //! Turns about changing axes are applied in twice the usual precision ([`Twofold`]).
 
 use super::twofold::Twofold;
-use crate::scene::{Vector, sin_cos_degrees};
+use crate::scene::{Vector, reduced, sin_cos_degrees};
 
 /// An axis of the turtle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -167,11 +167,6 @@ impl Frame {
         self.pending = 0.0;
         self.turned = None;
     }
-}
-
-/// An angle modulo 360. A remainder takes a hundred times as long as a comparison.
-fn reduced(degrees: f64) -> f64 {
-    if degrees.abs() < 360.0 { degrees } else { degrees % 360.0 }
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Conditions inside values (`v = if c > 1 then 2 else 0`) that decide over a production because its condition reads the value.
+//! Conditions inside equations: those in values (`v = if c > 1 then 2 else 0`) that decide over a production because its condition reads the value, and
+//! what those in rates change.
 
 use smallvec::SmallVec;
 
@@ -11,8 +12,19 @@ use dlsys_model::{Rule, Sign, Solve, Truth};
 fn clause<'r>(path: &Path<'r>, atom: usize) -> Option<&'r Solve> {
     let rule: &'r Rule = path.rule;
     let solve = &rule.solves[path.state.solve.get()?];
-    let asks = solve.switches.iter().any(|s| s.condition.atoms().any(|(other, _)| other == atom));
-    (asks && !solve.algebraic.is_empty() && read(rule, solve).next().is_some()).then_some(solve)
+    (asks(solve, atom) && !solve.algebraic.is_empty() && read(rule, solve).next().is_some()).then_some(solve)
+}
+
+/// True if a switch of a clause asks for an atom.
+fn asks(solve: &Solve, atom: usize) -> bool {
+    solve.switches.iter().any(|s| s.condition.atoms().any(|(other, _)| other == atom))
+}
+
+/// Puts the switches of a clause, which stand behind the variables, as signs have them.
+fn set(rule: &Rule, solve: &Solve, signs: impl Fn(usize) -> Sign, values: &mut [f64]) {
+    for (value, switch) in values[rule.variables..].iter_mut().zip(&solve.switches) {
+        *value = f64::from(u8::from(switch.condition.judge(&signs) != Truth::No));
+    }
 }
 
 /// The atoms of productions that read explicit values of a clause.
@@ -36,7 +48,7 @@ pub fn may_decide(path: &Path, atom: usize) -> bool {
 pub fn change_of_rate(path: &Path, atom: usize, position: f64, now: &[Sign], after: Sign) -> Option<f64> {
     let (rule, active) = (path.rule, path.state.solve.get()?);
     let solve = &rule.solves[active];
-    if !solve.switches.iter().any(|s| s.condition.atoms().any(|(other, _)| other == atom)) {
+    if !asks(solve, atom) {
         return None;
     }
     let after = |other: usize| if other == atom { after } else { now[other] };
@@ -47,9 +59,7 @@ pub fn change_of_rate(path: &Path, atom: usize, position: f64, now: &[Sign], aft
     path.everything_at(position, &mut values);
     let (mut scratch, mut rates) = (Vec::new(), [(); 2].map(|()| vec![0.0; solve.rates.outputs()]));
     solve.rates.eval(&values, &mut scratch, &mut rates[0]);
-    for (value, switch) in values[rule.variables..].iter_mut().zip(&solve.switches) {
-        *value = f64::from(u8::from(switch.condition.judge(after) != Truth::No));
-    }
+    set(rule, solve, after, &mut values);
     solve.rates.eval(&values, &mut scratch, &mut rates[1]);
     values.truncate(rule.variables);
     let mut moved: Vec<Dual<f64>> = values.into_iter().map(Dual::constant).collect();
@@ -78,9 +88,7 @@ pub fn decides(path: &Path, atom: usize, position: f64, now: &[Sign]) -> bool {
         let mut values = Vec::new();
         path.everything_at(position, &mut values);
         let of_atom = |other: usize| if other == atom { sign } else { now[other] };
-        for (value, switch) in values[rule.variables..].iter_mut().zip(&solve.switches) {
-            *value = f64::from(u8::from(switch.condition.judge(of_atom) != Truth::No));
-        }
+        set(rule, solve, of_atom, &mut values);
         let explicit = &solve.algebraic;
         let mut out = vec![0.0; explicit.values.outputs()];
         explicit.values.eval(&values, &mut Vec::new(), &mut out);
