@@ -499,16 +499,18 @@ fn cells_with_one_equilibrium_keep_their_order() {
 /// is below zero never takes place, and nothing is in doubt.
 #[test]
 fn empty_cells_are_not_below_zero() {
-    let row = |rate: &str, value: &str, guard: &str| {
+    let row = |(rate, right): (&str, f64), value: &str, guard: &str| {
         let cells = "F_v(0, 0) ".repeat(10);
         format!(
-            "initial string: F_w(1.446, 0) {cells} F_w(0.556, 0)\nF(l, p) < F_v(c, v) > F(r, q):\n solve dc/dt = {rate}, v = {value}\n {guard}"
+            "initial string: F_w(1.446, 0) {cells} F_w({right}, 0)\nF(l, p) < F_v(c, v) > F(r, q):\n solve dc/dt = {rate}, v = {value}\n {guard}"
         )
     };
     let rates = [
-        "0.702*(l + r - 2*c) + 1.332*c + 1.86*abs(r - c) - 0.897*c",
-        "0.128*c + 1.646*l/(1 + c*c) - 1.229*c",
-        "1.336*max(l - c, 0) + 0.331*abs(r - c) - 0.504*c",
+        ("0.702*(l + r - 2*c) + 1.332*c + 1.86*abs(r - c) - 0.897*c", 0.556),
+        ("0.128*c + 1.646*l/(1 + c*c) - 1.229*c", 0.556),
+        ("1.336*max(l - c, 0) + 0.331*abs(r - c) - 0.504*c", 0.556),
+        // The last cell leaves zero unseen, and goes back towards it for a while when its neighbour is found to leave.
+        ("1.143*abs(r - c) + 1.062*(l + r - 2*c) - 0.549*c", 0.0),
     ];
     let guards = [
         ("0", "if c < 0 produce F_v(0.4, 0)"),
@@ -526,12 +528,12 @@ fn empty_cells_are_not_below_zero() {
                         run(&text, settings, &[0.48]).unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"))
                     });
                     let [with, without] = [with, without].map(|mut states| states.swap_remove(0));
-                    assert_eq!(with.len(), without.len(), "{method:?} {tolerance:e}: {rate}; {guard}");
+                    assert_eq!(with.len(), without.len(), "{method:?} {tolerance:e}: {rate:?}; {guard}");
                     for (a, b) in with.iter().zip(&without) {
                         let off = (a.1[0] - b.1[0]).abs();
                         assert!(
                             off < 100.0 * tolerance,
-                            "{method:?} {tolerance:e}: {rate}; {guard}: {off:e}"
+                            "{method:?} {tolerance:e}: {rate:?}; {guard}: {off:e}"
                         );
                     }
                 }

@@ -5,7 +5,7 @@
 
 use super::EventStage;
 use super::modes::FAR_AWAY;
-use crate::detect::signs::{NEAR, opposite, sign_at_birth};
+use crate::detect::signs::{NEAR, noise, opposite, sign_at_birth};
 use crate::world::path::NEXT_TO_NOTHING;
 use crate::world::state::Signs;
 use dlsys_expr::Dual;
@@ -15,6 +15,9 @@ use smallvec::SmallVec;
 
 /// A rate of no more than this part of the value, over the length of a step, is rounding.
 const NOISE: f64 = 16.0 * f64::EPSILON;
+
+/// A difference that is so many times larger than the error of its sides has a sign.
+const CLEAR: f64 = 10.0;
 
 impl EventStage<'_, '_> {
     /// Where a module's signs go under the present equations. Also tells whether a sign turned out to be
@@ -72,7 +75,18 @@ impl EventStage<'_, '_> {
                 let noise = if entry.guess[atom] == Sign::Zero { least_way.max(unrest) } else { least_way };
                 if way > least * size && way > noise { Sign::of(slope) } else { Sign::Zero }
             };
+            // What was at zero, and is beyond it by more than its noise without having been seen to leave, has not come back yet.
+            let has_left = |towards: Sign| {
+                let gap = a.value - b.value;
+                let values: SmallVec<[f64; 16]> = moving.iter().map(|x| x.value).collect();
+                Sign::of(gap) == opposite(towards)
+                    && !rule.jumping_whole[atom]
+                    && gap.abs() > CLEAR * noise(rule, atom, &values, error.max(NEAR))
+            };
             after[atom] = match (clear(slope, 1e-9), entry.guess[atom]) {
+                (towards @ (Sign::Plus | Sign::Minus), Sign::Zero) if error > 0.0 && has_left(towards) => {
+                    Sign::Zero
+                }
                 (Sign::Zero, guess @ (Sign::Plus | Sign::Minus))
                     if !elsewhere && self.goes_on_alike(id, FAR_AWAY) =>
                 {
