@@ -511,10 +511,13 @@ fn empty_cells_are_not_below_zero() {
         ("1.336*max(l - c, 0) + 0.331*abs(r - c) - 0.504*c", 0.556),
         // The last cell leaves zero unseen, and goes back towards it for a while when its neighbour is found to leave.
         ("1.143*abs(r - c) + 1.062*(l + r - 2*c) - 0.549*c", 0.0),
+        // Which neighbour is larger where neither is more than next to nothing makes half of the rate.
+        ("0.643*(l + r - 2*c) + 0.672*abs(l - r) - 0.897*c", 0.0),
     ];
     let guards = [
         ("0", "if c < 0 produce F_v(0.4, 0)"),
         ("0", "if c + r < 0 produce ε"),
+        ("0", "if min(c, r) < 0 produce ε"),
         ("floor(3.612*c)", "if v < 0 produce F_v(0.4, 0)"),
         ("if c < 0 then 1 else 0", "if v > 0.5 produce ε"),
     ];

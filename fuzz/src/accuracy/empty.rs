@@ -21,7 +21,7 @@ pub struct EmptyRow {
 }
 
 /// Conditions that never hold, perhaps with a value behind a stroke, `#` being a positive number.
-const NEVER: [&str; 9] = [
+const NEVER: [&str; 10] = [
     "if c < 0 produce ε",
     "if c < 0 & x > 0.1 produce F_v(0, 0.4, 0)",
     "if v < 0 produce F_v(0, 0.4, 0)|floor(#*c)",
@@ -30,6 +30,7 @@ const NEVER: [&str; 9] = [
     "if #*c < 0 produce ε",
     "if c + r < 0 produce ε",
     "if c < -0*r produce ε",
+    "if -c > 0 produce F_v(0, 0.4, 0)",
     "if min(c, r) < 0 produce ε",
 ];
 
@@ -44,8 +45,11 @@ impl EmptyRow {
             format!("F_v({}, {value}, 0)", dice.between(0.0, 1.0))
         };
         let cells: Vec<String> = (0..count).map(|_| cell(dice)).collect();
-        let left = dice.between(0.0, 2.0);
         let right = if dice.roll(2) == 0 { dice.between(0.0, 2.0) } else { 0.0 };
+        let (left, right) = match dice.roll(4) {
+            0 => (right, dice.between(0.0, 2.0)),
+            _ => (dice.between(0.0, 2.0), right),
+        };
         let condition = dice.pick(&NEVER);
         let factor = dice.between(0.3, 5.0);
         let row = format!(
@@ -73,11 +77,16 @@ fn term(dice: &mut Dice) -> String {
     let term = dice.pick(&[
         "(l + r - 2*c)",
         "max(l - c, 0)",
+        "max(r - c, 0)",
         "abs(r - c)",
+        "abs(l - r)",
         "c*(1 - c/#)",
         "(if l > c then l - c else 0)",
+        "(if l > r then l else 0)",
         "l/(1 + c*c)",
         "min(r, #)",
+        "min(l, r)",
+        "max(l, r)",
         "l*r",
         "c",
     ]);

@@ -243,6 +243,7 @@ impl CrossingDetector {
         // The sign with which a boundary was left prevails over values that are rounding, and over a jump within the
         // resolution of time.
         let (mut from, mut tolerance) = (from, tolerance);
+        let is_among_others = path.reads_others() && path.error() > 0.0;
         let mut start = self.difference(path, atom).value(from);
         if path.rule.jumping_whole[atom] && sign != Sign::Any {
             let behind = (from + self.blur(path, atom, from)).min(limit);
@@ -267,9 +268,17 @@ impl CrossingDetector {
             if sign == Sign::Zero && then == 0.0 || then * sign_of(sign) > tolerance {
                 from = soon;
             } else {
-                let limit = if sign == Sign::Zero { 64.0 * f64::EPSILON } else { NOISE };
-                let noise = if start.abs() <= limit * size { 4.0 * start.abs() } else { 0.0 };
-                tolerance = tolerance.max(noise).max(self.rounding(path, atom, from));
+                let rounding = self.rounding(path, atom, from);
+                let is_noise = match sign {
+                    // What is next to nothing among others has left zero as soon as it is more than a rounding of what it is made of.
+                    Sign::Zero if is_among_others && !path.rule.jumping_whole[atom] => {
+                        start.abs() <= rounding
+                    }
+                    Sign::Zero => start.abs() <= 64.0 * f64::EPSILON * size,
+                    _ => start.abs() <= NOISE * size,
+                };
+                let noise = if is_noise { 4.0 * start.abs() } else { 0.0 };
+                tolerance = tolerance.max(noise).max(rounding);
             }
         }
         // Inside equations a sign may be that of noise: which of them are taken next to nothing does not count.
@@ -277,7 +286,6 @@ impl CrossingDetector {
             matches!(sign, Sign::Zero | Sign::Any)
                 || start.abs() <= noise && !path.rule.decides_productions(atom)
         };
-        let is_among_others = path.reads_others() && path.error() > 0.0;
         if is_among_others && start.abs() < path.error() {
             let noise = self.least_noise(path, atom, from);
             tolerance = if is_noise(noise) { tolerance.max(noise) } else { tolerance };

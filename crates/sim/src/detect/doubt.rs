@@ -41,6 +41,9 @@ const SLOW: f64 = 10.0;
 /// A difference that is this many times larger than the error of its sides lies surely outside the band.
 pub const FAR: f64 = 1e3;
 
+/// A difference among others that is larger is not next to nothing, whatever its sides are multiplied by.
+const SMALL: f64 = 1e-9;
+
 /// The band of a difference of values of neighbours is at least this many roundings wide.
 const BLUR: f64 = 4.0;
 
@@ -154,7 +157,8 @@ impl CrossingDetector {
         let [a, b] = [self.out[2 * atom], self.out[2 * atom + 1]];
         // `x - y` and 0 are small where `x` and `y` are not.
         let size = self.values.iter().fold(a.abs().max(b.abs()), |m, x| m.max(x.abs()));
-        let is_far = start.abs() > FAR * query.error * size;
+        let least = if path.reads_others() { SMALL } else { 0.0 };
+        let is_far = start.abs() > (FAR * query.error * size).max(least);
         let noise = if is_far { 0.0 } else { self.noise(path, atom, query.from) };
         // The value of a neighbour is approached only numerically, and rounding may make the sides equal at last.
         let around = path.rule.reads_context
@@ -434,10 +438,8 @@ impl CrossingDetector {
         // What stands alone, or is compared with another number than 0, may be next to nothing and follow its own size all the same; of two that
         // differ by less than what is followed nobody knows which is larger, and of one that no influence has reached yet not that it is not below 0.
         let may_be_nothing = |side: Interval| half_width(side, side) > 0.0 || side.magnitude() == 0.0;
-        let is_tiny = path.reads_others()
-            && width < path.error() * NEXT_TO_NOTHING
-            && may_be_nothing(a)
-            && may_be_nothing(b);
+        let is_tiny =
+            path.reads_others() && width < NEXT_TO_NOTHING && may_be_nothing(a) && may_be_nothing(b);
         let width = if is_tiny { width.max(self.noise_on_the_way(path, atom, at)) } else { width };
         // A wider one is that of a jump.
         let is_jump = || width > FAR * path.error() * a.magnitude().max(b.magnitude()).max(1.0);

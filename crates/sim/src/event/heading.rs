@@ -52,7 +52,8 @@ impl EventStage<'_, '_> {
             let reads =
                 |variable: &usize| rule.solves.iter().any(|solve| solve.rates.reads().contains(variable));
             let others = context.filter(reads).map(|variable| moving[variable]).filter(|x| x.rate != 0.0);
-            error * others.map(|x| x.value.abs() + x.rate.abs() * reach).fold(0.0, f64::max)
+            let around = others.map(|x| x.value.abs() + x.rate.abs() * reach).fold(0.0, f64::max);
+            NEXT_TO_NOTHING.max(error * around)
         } else {
             0.0
         };

@@ -153,7 +153,7 @@ impl EventStage<'_, '_> {
         rule.sides.eval(&self.scratch.variables, &mut self.scratch.registers, &mut out);
         let scale = self.world.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()));
         let error = if followed.is_some() { self.flows.error_among_others(self.world, id) } else { 0.0 };
-        let least = error * NEXT_TO_NOTHING;
+        let least = if error > 0.0 { NEXT_TO_NOTHING } else { 0.0 };
         let mut clear = true;
         let signs = (out.chunks(2).enumerate())
             .map(|(atom, side)| {

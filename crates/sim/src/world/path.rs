@@ -260,7 +260,7 @@ impl<'p> Path<'p> {
             exactly,
             |piece| {
                 let most = if on_the_way { piece.bounds().magnitude() } else { 0.0 };
-                around(piece.value(position), piece.error_of(NEXT_TO_NOTHING.max(most)))
+                around(piece.value(position), NEXT_TO_NOTHING.max(piece.error_of(most)))
             },
             |trajectory, x, offset| exactly(trajectory.at(x, offset + tau)),
             |t| exactly(t + tau),
