@@ -109,9 +109,9 @@ impl Judged for EmptyRow {
     }
 
     fn judge(&self) -> Verdict {
-        let Ok(without) = self.accuracy.run(&self.written(false), &TIMES) else { return Verdict::Open };
+        let Ok((without, _)) = self.accuracy.run(&self.written(false), &TIMES) else { return Verdict::Open };
         let with = match self.accuracy.run(&self.written(true), &TIMES) {
-            Ok(states) => states,
+            Ok((states, _)) => states,
             Err(message) => return Verdict::Refused(message),
         };
         for ((with, without), time) in with.iter().zip(&without).zip(TIMES) {

@@ -19,7 +19,7 @@
 //! Two modules, one of which reads the other, may have simultaneous events whose integrated instants differ; the second
 //! would then see the successors of the first. So when a module has its event, the events of those of its readers that
 //! are no further away than the error of integration happen with it
-//! ([`is_about_to_meet`](CrossingDetector::is_about_to_meet)).
+//! ([`about_to_meet`](CrossingDetector::about_to_meet)), with a warning if they are not much nearer than that.
 
 use crate::detect::crossing::{Crossing, CrossingDetector};
 use crate::detect::signs::{half_width, opposite, sign_of};
@@ -475,16 +475,18 @@ impl CrossingDetector {
         all + if all.is_finite() { self.rounding_width(path, atom, at) } else { 0.0 }
     }
 
-    /// True if the sides of an atom approach each other over the path, and are at its start no further apart than
-    /// `factor` times the error of integration.
-    pub fn is_about_to_meet(&mut self, path: &Path, atom: usize, sign: Sign, factor: f64) -> bool {
+    /// How far the sides of an atom are apart at the start of a path, as a part of `factor` times the error of integration, if that is no more than 1
+    /// and they approach each other over the path.
+    pub fn about_to_meet(&mut self, path: &Path, atom: usize, sign: Sign, factor: f64) -> Option<f64> {
         let gap = sign_of(sign) * self.difference(path, atom).value(0.0);
         let error = path.error().max(f64::EPSILON);
-        if gap > FAR * factor * error * (1.0 + gap) || gap > factor * self.noise(path, atom, 0.0) {
-            return false;
+        if gap > FAR * factor * error * (1.0 + gap) {
+            return None;
         }
+        let noise = factor * self.noise(path, atom, 0.0);
         let rate = self.difference(path, atom).bounds(0.0, 1.0).rate;
-        sign_of(sign) * rate.lo < 0.0 && sign_of(sign) * rate.hi < 0.0
+        let approaches = sign_of(sign) * rate.lo < 0.0 && sign_of(sign) * rate.hi < 0.0;
+        (gap <= noise && approaches).then(|| if gap > 0.0 { gap / noise } else { 0.0 })
     }
 
     /// A crossing at a position.

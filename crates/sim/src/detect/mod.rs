@@ -42,6 +42,8 @@ pub struct Detector {
     /// By rule and atom whose sides have come nearer each other than the error of integration: the time at which that
     /// first happened, and the number of modules for which it is still open whether they meet.
     approached: BTreeMap<(usize, usize), (f64, usize)>,
+    /// By rule and atom whose event has been taken to be one instant with that of a neighbour, though they are not surely so: the first time.
+    joined: BTreeMap<(usize, usize), f64>,
 }
 
 impl Detector {
@@ -65,9 +67,14 @@ impl Detector {
         }
     }
 
+    /// Records that an atom of a rule has met together with the event of a neighbour, though it may be a little later.
+    pub fn note_joined(&mut self, rule: usize, atom: usize, at: SimTime) {
+        self.joined.entry((rule, atom)).or_insert(at.to_f64());
+    }
+
     /// Warnings about the run so far: rules whose rates could not be bounded somewhere, so that a pulse may have been
-    /// overlooked there; and sides of conditions that have come nearer each other than the error of integration, so
-    /// that a production may have been due.
+    /// overlooked there; sides of conditions that have come nearer each other than the error of integration, so
+    /// that a production may have been due; and events that have been taken to be one instant.
     pub fn remarks(&self, model: &Model) -> Vec<Diagnostic> {
         let remark = |(&rule, &t): (&usize, &f64)| {
             let rule = &model.rules[rule];
@@ -75,10 +82,13 @@ impl Detector {
                 .at(rule.span, "these equations")
                 .help("a rate that is very large there for a very short time may be overlooked: see what is divided by, or taken the logarithm of, or compare with `--method rk4 --step-size H`")
         };
+        let boundary = |rule: usize, atom: usize| {
+            let boundary = model.rules[rule].boundaries[atom].to_string();
+            if boundary.is_empty() { "a boundary".to_string() } else { boundary }
+        };
         let near = |(&(rule, atom), &(t, _)): (&(usize, usize), &(f64, usize))| {
+            let boundary = boundary(rule, atom);
             let rule = &model.rules[rule];
-            let boundary = rule.boundaries[atom].to_string();
-            let boundary = if boundary.is_empty() { "a boundary" } else { &boundary };
             Diagnostic::warning(format!(
                 "{} comes so near {boundary} by t = {} that the error of integration does not tell whether it meets it",
                 rule.label,
@@ -87,6 +97,18 @@ impl Detector {
             .at(rule.atoms[atom], "as long as that is so, nothing follows")
             .help("a smaller `--tolerance` tells more; if what comes near is to count, say how near: `if x >= y - 1e-5`")
         };
-        self.unbounded.iter().map(remark).chain(self.approached.iter().map(near)).collect()
+        let joined = |(&(rule, atom), &t): (&(usize, usize), &f64)| {
+            let boundary = boundary(rule, atom);
+            let rule = &model.rules[rule];
+            Diagnostic::warning(format!(
+                "{} is so near {boundary} at an event of its neighbour, t = {}, that the error of integration does not tell which is first",
+                rule.label,
+                brief(t, 6)
+            ))
+            .at(rule.atoms[atom], "both happen at that time")
+            .help("a smaller `--tolerance` tells more; if both are meant to happen together, all is well")
+        };
+        let approached = self.approached.iter().map(near);
+        self.unbounded.iter().map(remark).chain(approached).chain(self.joined.iter().map(joined)).collect()
     }
 }
