@@ -82,10 +82,13 @@ impl Tick {
         let mut points = Vec::new();
         for stem in 0..skeleton.len() {
             points.push(pose.point(stem, 1.0));
-            points.extend(skeleton.loads(stem).iter().map(|load| {
-                let section = pose.at(stem, load.at);
-                section.origin + section.axes * load.centre * 2.0
-            }));
+            // What a section carries is one load, but each organ has plates of its own.
+            let loads = skeleton.loads(stem).iter().map(|load| (load.at, load.centre));
+            let plates = skeleton.plates(stem).chunk_by(|a, b| (a.at, a.centre) == (b.at, b.centre));
+            for (at, centre) in loads.chain(plates.map(|plates| (plates[0].at, plates[0].centre))) {
+                let section = pose.at(stem, at);
+                points.push(section.origin + section.axes * centre * 2.0);
+            }
         }
         points
     }

@@ -84,6 +84,11 @@ pub(crate) struct Section {
 }
 
 impl Section {
+    pub(crate) const ZERO: Section = {
+        let zero = Vector::new(0.0, 0.0, 0.0);
+        Section { theta: zero, xi: 0.0, across: zero, inward: zero, a: 0.0, b: [0.0; 3], c: [0.0; 3] }
+    };
+
     /// The section at the fraction `xi` of a segment with the rotation vector `theta`.
     #[inline(always)]
     pub(crate) fn new(theta: &Vector, xi: f64) -> Section {

@@ -48,25 +48,25 @@ impl Forces {
 
     /// A force at a place that the strain moves by `shift`.
     #[inline(always)]
-    fn push(&mut self, place: &Vector, shift: &Matrix, force: &Vector) {
+    pub(crate) fn push(&mut self, place: &Vector, shift: &Matrix, force: &Vector) {
         self.wrench.push(place, force);
         self.pull += shift.tr_mul(force);
     }
 
     /// A moment on a section that the strain turns by `turning`.
     #[inline(always)]
-    fn twist(&mut self, turning: &Matrix, moment: &Vector) {
+    pub(crate) fn twist(&mut self, turning: &Matrix, moment: &Vector) {
         self.wrench.moment += moment;
         self.pull += turning.tr_mul(moment);
     }
 
-    /// Geometric terms of a force at a place behind a section.
+    /// Geometric terms of forces at places behind a section, whose sum is `force`, and that of place times force `virial`.
     #[inline(always)]
-    fn stretch(&mut self, place: &Vector, tip: &Vector, xi: f64, force: &Vector) {
-        let row = force.transpose();
-        self.virial += place * row;
-        self.mean += (place * xi - tip * (0.5 * xi * xi)) * row;
-        self.late += (place * (xi * xi) - tip * (2.0 / 3.0 * xi * xi * xi)) * row;
+    pub(crate) fn stretch(&mut self, virial: &Matrix, tip: &Vector, xi: f64, force: &Vector) {
+        let own = tip * force.transpose();
+        self.virial += virial;
+        self.mean += virial * xi - own * (0.5 * xi * xi);
+        self.late += virial * (xi * xi) - own * (2.0 / 3.0 * xi * xi * xi);
     }
 }
 
@@ -132,33 +132,8 @@ impl Part<'_> {
         let own = place.tip * sum.transpose();
         forces.mean = own * (1.0 / 6.0);
         forces.late = own * (1.0 / 12.0);
-        self.carried(local, place, wind, &mut forces);
+        self.add_carried(local, place, wind, &mut forces);
         forces
-    }
-
-    fn carried(&self, local: &Local, place: &Place, wind: &Vector, forces: &mut Forces) {
-        for load in self.loads {
-            let motion = local.motion(load.at);
-            let axes = motion.section.rotation();
-            let arm = axes * load.centre;
-            let force = motion.acceleration_at(&arm) * -load.mass;
-            forces.push(&(motion.place + arm), &motion.shift_at(&arm), &force);
-            forces.stretch(&(motion.place + arm), &place.tip, load.at, &force);
-            let inertia = axes * load.inertia * axes.transpose();
-            let turn =
-                inertia * motion.angular_acceleration + motion.angular.cross(&(inertia * motion.angular));
-            forces.twist(&motion.turning, &-turn);
-        }
-        for plate in self.plates {
-            let motion = local.motion(plate.at);
-            let axes = motion.section.rotation();
-            let arm = axes * plate.centre;
-            let velocity = motion.velocity_at(&arm);
-            let force = self.air.plate_drag(plate.area, &(axes * plate.normal), &(velocity - wind));
-            forces.power += force.dot(&velocity);
-            forces.push(&(motion.place + arm), &motion.shift_at(&arm), &force);
-            forces.stretch(&(motion.place + arm), &place.tip, plate.at, &force);
-        }
     }
 
     /// Drag alone: wrench and pull of a second wind minus those of the first, at the same place and velocity.
@@ -174,15 +149,7 @@ impl Part<'_> {
                 forces.push(&point.place, &point.shift, &(after - before));
             }
         }
-        for plate in self.plates {
-            let motion = local.motion(plate.at);
-            let axes = motion.section.rotation();
-            let arm = axes * plate.centre;
-            let (normal, velocity) = (axes * plate.normal, motion.velocity_at(&arm));
-            let [before, after] =
-                winds.map(|wind| self.air.plate_drag(plate.area, &normal, &(velocity - wind)));
-            forces.push(&(motion.place + arm), &motion.shift_at(&arm), &(after - before));
-        }
+        self.gust_on_plates(local, winds, &mut forces);
         (forces.wrench, forces.pull)
     }
 
@@ -202,7 +169,7 @@ impl Part<'_> {
             form.spin(&round, &point.turning);
         }
         for load in self.loads {
-            let motion = local.motion(load.at);
+            let motion = local.carrier(load.at);
             let axes = motion.section.rotation();
             let arm = axes * load.centre;
             form.mass(load.mass, &(motion.place + arm), &motion.shift_at(&arm));
@@ -217,10 +184,7 @@ impl Part<'_> {
         if self.feels_air() {
             let damper = self.damper(local, stretch, wind);
             form.damper(&(damper.damping * damping), &damper.place, &damper.shift);
-            for plate in self.plates {
-                let damper = self.plate_damper(local, plate, wind);
-                form.damper(&(damper.damping * damping), &damper.place, &damper.shift);
-            }
+            self.plate_drag(local, wind).for_each(|drag| drag.put_into(&mut form, damping));
         }
         form
     }
@@ -253,7 +217,7 @@ impl Part<'_> {
             first += point.place * half;
         }
         for load in self.loads {
-            let motion = local.motion(load.at);
+            let motion = local.carrier(load.at);
             let axes = motion.section.rotation();
             let arm = axes * load.centre;
             let omega = axes.tr_mul(&motion.angular);
@@ -278,19 +242,6 @@ impl Part<'_> {
             place: section.place() * local.length,
             shift: section.shift() * local.length,
             damping: self.air.cylinder_damping(area, &section.tangent(), &(velocity - wind)),
-        }
-    }
-
-    /// What stands for the drag of a plate in the matrix.
-    pub(crate) fn plate_damper(&self, local: &Local, plate: &Plate, wind: &Vector) -> Damper {
-        let motion = local.motion(plate.at);
-        let axes = motion.section.rotation();
-        let arm = axes * plate.centre;
-        let velocity = motion.velocity_at(&arm) - wind;
-        Damper {
-            place: motion.place + arm,
-            shift: motion.shift_at(&arm),
-            damping: self.air.plate_damping(plate.area, &(axes * plate.normal), &velocity),
         }
     }
 }

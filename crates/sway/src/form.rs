@@ -63,7 +63,7 @@ pub(crate) fn cross_columns(place: &Vector, matrix: &Matrix) -> Matrix {
 
 /// `matrix · [place]`.
 #[inline(always)]
-fn times_cross(matrix: &Matrix, place: &Vector) -> Matrix {
+pub(crate) fn times_cross(matrix: &Matrix, place: &Vector) -> Matrix {
     -cross_columns(place, &matrix.transpose()).transpose()
 }
 
@@ -75,6 +75,14 @@ impl Inertia {
     pub(crate) fn turned(&self, turn: &Matrix) -> Inertia {
         let back = turn.transpose();
         Inertia { aa: turn * self.aa * back, al: turn * self.al * back, ll: turn * self.ll * back }
+    }
+
+    /// Multiplies the form by a number.
+    #[inline(always)]
+    pub(crate) fn scale(&mut self, factor: f64) {
+        for matrix in [&mut self.aa, &mut self.al, &mut self.ll] {
+            *matrix *= factor;
+        }
     }
 
     /// The same form for the twist at an origin from which this one's is at `place`.
@@ -173,9 +181,7 @@ impl Form {
 
     /// Multiplies the form by a number.
     pub(crate) fn scale(&mut self, factor: f64) {
-        for matrix in [&mut self.inertia.aa, &mut self.inertia.al, &mut self.inertia.ll] {
-            *matrix *= factor;
-        }
+        self.inertia.scale(factor);
         self.moment *= factor;
         self.force *= factor;
         self.own *= factor;

@@ -58,6 +58,7 @@
 mod air;
 mod analysis;
 mod arc;
+mod carried;
 mod energy;
 mod equilibrium;
 mod error;

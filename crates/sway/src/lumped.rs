@@ -1,8 +1,8 @@
-//! Skeletons with fewer loads and plates that move in the same way.
+//! Skeletons with fewer plates, and fewer loads, that move in the same way.
 
 use nalgebra::SymmetricEigen;
 
-use crate::{Load, Matrix, Plate, Skeleton, Vector};
+use crate::{Matrix, Plate, Skeleton, Vector};
 
 impl Skeleton {
     /// The same skeleton with one load and at most three plates at each section that carries any.
@@ -16,7 +16,7 @@ impl Skeleton {
             out.push(*segment);
             let loads = self.loads(index);
             for at in sections(loads.iter().map(|load| load.at)) {
-                out.load(one(loads.iter().filter(|load| load.at == at), at));
+                loads.iter().filter(|load| load.at == at).for_each(|load| out.load(*load));
             }
             let plates = self.plates(index);
             for at in sections(plates.iter().map(|plate| plate.at)) {
@@ -43,20 +43,6 @@ fn sections(all: impl Iterator<Item = f64>) -> Vec<f64> {
     sections
 }
 
-/// Loads of one section as one.
-fn one<'a>(loads: impl Iterator<Item = &'a Load> + Clone, at: f64) -> Load {
-    let mass: f64 = loads.clone().map(|load| load.mass).sum();
-    let first: Vector = loads.clone().map(|load| load.centre * load.mass).sum();
-    let centre = if mass > 0.0 { first / mass } else { Vector::zeros() };
-    let mut inertia = Matrix::zeros();
-    for load in loads {
-        let arm = load.centre - centre;
-        let shift = Matrix::identity() * arm.norm_squared() - arm * arm.transpose();
-        inertia += load.inertia + shift * load.mass;
-    }
-    Load { at, mass, centre, inertia }
-}
-
 /// Three plates with the drag of many.
 fn three(plates: &[&Plate], at: f64) -> impl Iterator<Item = Plate> {
     let sum: Matrix = plates.iter().map(|plate| plate.normal * plate.normal.transpose() * plate.area).sum();
@@ -74,7 +60,7 @@ fn three(plates: &[&Plate], at: f64) -> impl Iterator<Item = Plate> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Air, Segment};
+    use crate::{Air, Load, Segment};
 
     #[test]
     fn many_plates_and_loads_are_few_that_feel_the_same() {

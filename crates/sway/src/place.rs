@@ -56,6 +56,8 @@ pub(crate) struct Local {
     theta_acceleration: Vector,
     base: Twist,
     rate: Twist,
+    /// The end, where most of what is carried is.
+    end: Motion,
 }
 
 /// The motion of a section.
@@ -133,7 +135,7 @@ impl Local {
         let kappa = segment.rest + strain.value;
         let kappa_rate = segment.rest_rate + strain.rate;
         let kappa_acceleration = segment.rest_acceleration + strain.acceleration;
-        let local = Local {
+        let mut local = Local {
             length: segment.length,
             length_rate: segment.length_rate,
             length_acceleration: segment.length_acceleration,
@@ -144,8 +146,10 @@ impl Local {
                 + kappa_acceleration * segment.length,
             base,
             rate,
+            end: Motion::ZERO,
         };
         let end = local.motion(1.0);
+        local.end = end;
         place.end = end.section.rotation();
         place.tip = end.place;
         place.turning = end.turning;
@@ -162,6 +166,12 @@ impl Local {
         place.flow.linear = flow.at(&place.tip) + place.shift * swing;
         place.flow.angular = flow.angular + place.turning * swing;
         (local, place)
+    }
+
+    /// The motion of a section that carries something.
+    #[inline(always)]
+    pub(crate) fn carrier(&self, xi: f64) -> Motion {
+        if xi == 1.0 { self.end } else { self.motion(xi) }
     }
 
     /// The section at a fraction of the length.
@@ -205,6 +215,20 @@ impl Local {
 }
 
 impl Motion {
+    const ZERO: Motion = {
+        let zero = Vector::new(0.0, 0.0, 0.0);
+        Motion {
+            section: Section::ZERO,
+            place: zero,
+            turning: ZEROS,
+            shift: ZEROS,
+            angular: zero,
+            velocity: zero,
+            angular_acceleration: zero,
+            acceleration: zero,
+        }
+    };
+
     /// Derivative by the strain, divided by the length, of a point that the section carries at `arm`.
     #[inline(always)]
     pub(crate) fn shift_at(&self, arm: &Vector) -> Matrix {

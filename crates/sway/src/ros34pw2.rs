@@ -4,6 +4,7 @@
 //! five eliminations instead of one.
 
 use crate::Wind;
+use crate::carried::by_section;
 use crate::link::{Weights, transport};
 use crate::ros2::StepError;
 use crate::sweep::{Bend, Instant, Workspace};
@@ -135,12 +136,17 @@ impl Workspace {
             link.pull -= rigidity.component_mul(&(pressed + slowed * segment.damping));
             link.press(-1.0, segment.length, &fields[0].angular, &pressed);
             let first = skeleton.first_plate(index);
-            let plates = &self.plate_dampers[first..first + skeleton.plates(index).len()];
-            for damper in std::iter::once(link.damper).chain(plates.iter().copied()) {
-                let velocity = fields[1].at(&damper.place) + damper.shift * (slowed * segment.length);
-                let force = -(damper.damping * velocity);
-                link.wrench.push(&damper.place, &force);
-                link.pull += damper.shift.tr_mul(&force);
+            let (damper, long) = (link.damper, slowed * segment.length);
+            let velocity = fields[1].at(&damper.place) + damper.shift * long;
+            let force = -(damper.damping * velocity);
+            link.wrench.push(&damper.place, &force);
+            link.pull += damper.shift.tr_mul(&force);
+            let sections = by_section(skeleton.plates(index)).count();
+            for drag in &self.plate_drags[first..first + sections] {
+                let (wrench, pull) = drag.force(&fields[1], &long);
+                link.wrench.moment += wrench.moment;
+                link.wrench.force += wrench.force;
+                link.pull += pull;
             }
         }
     }

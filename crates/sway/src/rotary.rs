@@ -50,7 +50,7 @@ impl Workspace {
             own.first += mass * length / 2.0;
             own.second += mass * length * length / 3.0;
             for load in skeleton.loads(index) {
-                own.add(load.mass, load.at * length + load.centre.norm());
+                own.add(load.mass, load.at * length + load.spread());
             }
             let own = *own;
             self.rotary[index] = delta * delta * length * (own.mass * own.second).sqrt();

@@ -151,6 +151,26 @@ impl Load {
     pub fn point(at: f64, mass: f64) -> Load {
         Load { at, mass, centre: Vector::zeros(), inertia: Matrix::zeros() }
     }
+
+    /// Root of the mean square of the distance of its masses from the section, in m.
+    pub fn spread(&self) -> f64 {
+        let own = if self.mass > 0.0 { 0.5 * self.inertia.trace() / self.mass } else { 0.0 };
+        (self.centre.norm_squared() + own.max(0.0)).sqrt()
+    }
+
+    /// This body and another one of the same section as one; None for other sections, and for masses that are none.
+    fn with(&self, other: &Load) -> Option<Load> {
+        let mass = self.mass + other.mass;
+        if self.at != other.at || !(self.mass >= 0.0 && other.mass >= 0.0 && mass.is_finite()) {
+            return None;
+        }
+        let part = if mass > 0.0 { other.mass / mass } else { 0.0 };
+        let arm = other.centre - self.centre;
+        // The theorem of parallel axes, with the reduced mass.
+        let apart = Matrix::identity() * arm.norm_squared() - arm * arm.transpose();
+        let inertia = self.inertia + other.inertia + apart * (self.mass * part);
+        Some(Load { at: self.at, mass, centre: self.centre + arm * part, inertia })
+    }
 }
 
 /// A flat surface fixed to a section of a segment, which air pushes: the blade of a leaf.
@@ -213,12 +233,16 @@ impl Skeleton {
         self.segments.len() - 1
     }
 
-    /// Adds a load to the segment pushed last. Without a segment, nothing happens.
+    /// Adds a load to the segment pushed last. Without a segment, nothing happens. Loads of one section that follow each other become one: they are
+    /// one rigid body.
     pub fn load(&mut self, load: Load) {
-        if let Some(end) = self.load_ends.last_mut() {
-            self.loads.push(load);
-            *end = self.loads.len() as u32;
+        let Some((end, before)) = self.load_ends.split_last_mut() else { return };
+        let first = before.last().map_or(0, |end| *end as usize);
+        match self.loads[first..].last_mut().and_then(|known| Some((known.with(&load)?, known))) {
+            Some((both, known)) => *known = both,
+            None => self.loads.push(load),
         }
+        *end = self.loads.len() as u32;
     }
 
     /// Adds a plate to the segment pushed last. Without a segment, nothing happens.

@@ -1,6 +1,7 @@
 //! Passes over the tree: places and forces from the roots to the tips, elimination back.
 
 use crate::Wind;
+use crate::carried::PlateDrag;
 use crate::forces::{Damper, Forces, Part, Stretch};
 use crate::form::{Twist, Wrench};
 use crate::link::{Link, Weights, pair, transport};
@@ -15,7 +16,8 @@ pub(crate) struct Workspace {
     pub places: Vec<Place>,
     /// Places of the second stage.
     pub later: Vec<Place>,
-    pub plate_dampers: Vec<Damper>,
+    /// Of the sections of each segment that carry plates, from the number of its first plate on.
+    pub plate_drags: Vec<PlateDrag>,
     /// Moments of the weight on the rest shape, where that is an equilibrium.
     pub rest_moments: Vec<Vector>,
     /// Moment of inertia of each segment about its tangent in addition to that of its sections, in kg m².
@@ -81,7 +83,7 @@ impl Workspace {
         self.later.resize(n, Place::ZERO);
         self.rest_moments.resize(n, Vector::zeros());
         self.rotary.resize(n, 0.0);
-        self.plate_dampers.resize(skeleton.plate_count(), Damper::ZERO);
+        self.plate_drags.resize(skeleton.plate_count(), PlateDrag::ZERO);
     }
 
     /// Moments of the weight on the rest shape: what the tissue of segments without `sag` carries when they are at rest.
@@ -207,10 +209,9 @@ impl Workspace {
                 let damper = &link.damper;
                 link.form.damper(&(damper.damping * weights.damping), &damper.place, &damper.shift);
                 let first = skeleton.first_plate(index);
-                for (k, plate) in part.plates.iter().enumerate() {
-                    let damper = part.plate_damper(&local, plate, &wind);
-                    link.form.damper(&(damper.damping * weights.damping), &damper.place, &damper.shift);
-                    self.plate_dampers[first + k] = damper;
+                for (drag, kept) in part.plate_drag(&local, &wind).zip(&mut self.plate_drags[first..]) {
+                    drag.put_into(&mut link.form, weights.damping);
+                    *kept = drag;
                 }
             }
             self.places[index] = place;

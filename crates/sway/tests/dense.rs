@@ -58,8 +58,12 @@ fn random_tree(draws: &mut Draws, n: usize) -> Skeleton {
         let at = 0.5 + 0.5 * draws.one();
         skeleton.load(Load { at, mass: 0.2, centre: draws.vector(0.1), inertia: spread });
         skeleton.load(Load::point(1.0, 0.1));
-        let normal = draws.vector(1.0).normalize();
-        skeleton.plate(Plate { at: 0.7, centre: draws.vector(0.1), normal, area: 0.05 });
+        // Some sections carry several.
+        for at in [0.7, 1.0, 1.0] {
+            let normal = draws.vector(1.0).normalize();
+            skeleton.plate(Plate { at, centre: draws.vector(0.1), normal, area: 0.05 });
+        }
+        skeleton.load(Load { at: 1.0, mass: 0.1, centre: draws.vector(0.1), inertia: spread * 0.5 });
     }
     skeleton
 }
@@ -87,7 +91,7 @@ fn flywheels(skeleton: &Skeleton, delta: f64) -> Vec<f64> {
         // Simpson's rule is exact for the square of the distance along a rod.
         let rod = segment.mass * segment.length / 6.0;
         let mut parts = vec![(0.0, rod), (0.5 * segment.length, 4.0 * rod), (segment.length, rod)];
-        let arm = |load: &Load| load.at * segment.length + load.centre.norm();
+        let arm = |load: &Load| load.at * segment.length + load.spread();
         parts.extend(skeleton.loads(index).iter().map(|load| (arm(load), load.mass)));
         let (mut at, mut before) = (index, 0.0);
         loop {

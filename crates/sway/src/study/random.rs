@@ -124,7 +124,7 @@ fn stand(draws: &mut Draws, skeleton: &mut Skeleton) {
     let (mut mass, mut reach, mut worst) = (vec![0.0_f64; n], vec![0.0_f64; n], 0.0_f64);
     for index in (0..n).rev() {
         let loads: f64 = skeleton.loads(index).iter().map(|load| load.mass).sum();
-        let arm = skeleton.loads(index).iter().map(|load| load.centre.norm()).fold(0.0, f64::max);
+        let arm = skeleton.loads(index).iter().map(Load::spread).fold(0.0, f64::max);
         let segment = &skeleton.segments()[index];
         mass[index] += segment.mass * segment.length + loads;
         reach[index] = segment.length + reach[index].max(arm);
