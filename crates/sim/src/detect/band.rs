@@ -4,7 +4,8 @@
 use crate::detect::crossing::{CrossingDetector, NOISE};
 use crate::detect::doubt::FAR;
 use crate::detect::signs::half_width;
-use crate::world::path::{NEXT_TO_NOTHING, Path};
+use crate::world::path::Path;
+use crate::world::sizes::NEXT_TO_NOTHING;
 use dlsys_expr::{Dual, Interval, Value};
 use dlsys_model::ZeroCrossing;
 use smallvec::SmallVec;

@@ -7,7 +7,7 @@ use super::levels::put_levels;
 use crate::detect::crossing::TOUCH;
 use crate::detect::signs::{EQUAL, NEAR, noise, opposite};
 use crate::world::context::Context;
-use crate::world::path::NEXT_TO_NOTHING;
+use crate::world::sizes::NEXT_TO_NOTHING;
 use crate::world::state::Signs;
 use dlsys_model::{ContextPart, Pattern, Rule, Sign};
 use dlsys_tree::ModuleId;
@@ -153,7 +153,7 @@ impl EventStage<'_, '_> {
         rule.sides.eval(&self.scratch.variables, &mut self.scratch.registers, &mut out);
         let scale = self.world.tree.parameters(id).iter().fold(1.0, |m: f64, x| m.max(x.abs()));
         let error = if followed.is_some() { self.flows.error_among_others(self.world, id) } else { 0.0 };
-        let least = if error > 0.0 { NEXT_TO_NOTHING } else { 0.0 };
+        let least = error * NEXT_TO_NOTHING;
         let mut clear = true;
         let signs = (out.chunks(2).enumerate())
             .map(|(atom, side)| {
@@ -172,7 +172,13 @@ impl EventStage<'_, '_> {
                 };
                 let equal = size.is_finite() && (difference.abs() <= tolerance * size || is_rounding());
                 // Next to nothing there is no sign but the one that it had.
-                if let Some((signs, _)) = followed.as_ref().filter(|_| !equal && difference.abs() <= least) {
+                let is_nothing = || {
+                    difference.abs() <= least
+                        || error > 0.0
+                            && difference.abs() <= NEXT_TO_NOTHING
+                            && difference.abs() <= self.least_difference(id, rule, atom)
+                };
+                if let Some((signs, _)) = followed.as_ref().filter(|_| !equal && is_nothing()) {
                     clear = false;
                     return signs[atom];
                 }
