@@ -6,7 +6,7 @@
 //! unless the bounds over the whole path already exclude a change of sign.
 
 use crate::detect::level::LevelDifference;
-use crate::detect::signs::{NEAR, Reach, is_at, opposite, rate_at, reach, sign_of};
+use crate::detect::signs::{NEAR, Reach, half_width, is_at, opposite, rate_at, reach, sign_of};
 use crate::world::path::Path;
 use crate::world::state::State;
 use crate::world::trajectories::Law;
@@ -14,6 +14,7 @@ use dlsys_expr::{Binary, Dual, Interval, Program, Scratch, Value};
 use dlsys_model::{AffineSum, Rule, Sign, ZeroCrossing};
 use dlsys_ode::{Function, Root, first_root};
 use dlsys_tree::SimTime;
+use smallvec::SmallVec;
 
 /// A difference of two sides counts as zero up to this many times the size of the sides.
 pub const TOUCH: f64 = 256.0 * f64::EPSILON;
@@ -22,7 +23,7 @@ pub const TOUCH: f64 = 256.0 * f64::EPSILON;
 pub(super) const POLE: f64 = 1e8;
 
 /// Residue that numerical trajectories may leave of zero, relative to the size of the sides or to 1.
-pub(super) const NOISE: f64 = 1e-10;
+const NOISE: f64 = 1e-10;
 
 /// A part of a path over which rates are known, but for the rounding of values.
 const INSTANT: f64 = 1e-6;
@@ -68,6 +69,16 @@ pub struct Crossing {
     pub after: Sign,
     /// The parameter that reaches a level there, or the time, and the level, if both are known.
     pub level: Option<(usize, f64)>,
+}
+
+/// What the rounding of variables does to the sides of an atom.
+struct Widened {
+    /// On the difference of the sides.
+    width: f64,
+    /// The size of the sides.
+    size: f64,
+    /// The sides are defined, and finite.
+    bounded: bool,
 }
 
 /// The difference of the two sides of an atom, as a function of the position on a path.
@@ -232,7 +243,6 @@ impl CrossingDetector {
         // The sign with which a boundary was left prevails over values that are rounding, and over a jump within the
         // resolution of time.
         let (mut from, mut tolerance) = (from, tolerance);
-        let is_among_others = path.reads_others() && path.error() > 0.0;
         let mut start = self.difference(path, atom).value(from);
         if path.rule.jumping_whole[atom] && sign != Sign::Any {
             let behind = (from + self.blur(path, atom, from)).min(limit);
@@ -257,17 +267,9 @@ impl CrossingDetector {
             if sign == Sign::Zero && then == 0.0 || then * sign_of(sign) > tolerance {
                 from = soon;
             } else {
-                let rounding = self.rounding(path, atom, from);
-                let is_noise = match sign {
-                    // What is next to nothing among others has left zero as soon as it is more than a rounding of what it is made of.
-                    Sign::Zero if is_among_others && !path.rule.jumping_whole[atom] => {
-                        start.abs() <= rounding
-                    }
-                    Sign::Zero => start.abs() <= 64.0 * f64::EPSILON * size,
-                    _ => start.abs() <= NOISE * size,
-                };
-                let noise = if is_noise { 4.0 * start.abs() } else { 0.0 };
-                tolerance = tolerance.max(noise).max(rounding);
+                let limit = if sign == Sign::Zero { 64.0 * f64::EPSILON } else { NOISE };
+                let noise = if start.abs() <= limit * size { 4.0 * start.abs() } else { 0.0 };
+                tolerance = tolerance.max(noise).max(self.rounding(path, atom, from));
             }
         }
         // Inside equations a sign may be that of noise: which of them are taken next to nothing does not count.
@@ -275,6 +277,7 @@ impl CrossingDetector {
             matches!(sign, Sign::Zero | Sign::Any)
                 || start.abs() <= noise && !path.rule.decides_productions(atom)
         };
+        let is_among_others = path.reads_others() && path.error() > 0.0;
         if is_among_others && start.abs() < path.error() {
             let noise = self.least_noise(path, atom, from);
             tolerance = if is_noise(noise) { tolerance.max(noise) } else { tolerance };
@@ -358,6 +361,29 @@ impl CrossingDetector {
         times.fold(BLUR * path.start.resolution() / path.h, f64::max).min(longest)
     }
 
+    /// The effect on the difference of two sides of errors of integration that nobody follows, because the values are next to nothing: what has not
+    /// arrived has no sign. 0 where the difference jumps.
+    pub(super) fn least_noise(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        path.next_to_nothing(at, false, &mut self.around);
+        self.width_around(path, atom)
+    }
+
+    /// The same, and of those inside the step of values that are next to nothing and become more.
+    pub(super) fn noise_on_the_way(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        path.next_to_nothing(at, true, &mut self.around);
+        self.width_around(path, atom)
+    }
+
+    /// Half the width of the difference of two sides of values that are around some; 0 where the difference jumps.
+    fn width_around(&mut self, path: &Path, atom: usize) -> f64 {
+        let sides = &path.rule.sides;
+        self.around_out.resize(sides.outputs(), Interval::EMPTY);
+        sides.eval(&self.around, &mut self.whole_scratch, &mut self.around_out);
+        let [a, b] = [0, 1].map(|side| self.around_out[2 * atom + side]);
+        let width = half_width(a, b);
+        if path.rule.jumping_whole[atom] || !width.is_finite() { 0.0 } else { width }
+    }
+
     /// True if a difference that is found on the one side of zero, and then on the other, is a difference of large numbers, none of which
     /// may come nearer to zero: it passes zero without a jump.
     fn passes_by_rounding(&mut self, path: &Path, atom: usize, at: f64) -> bool {
@@ -368,6 +394,50 @@ impl CrossingDetector {
             true => there <= self.rounding(path, atom, at),
             false => self.is_bounded_around(path, atom, at),
         }
+    }
+
+    /// False where a difference passes through infinity: the rounding of a variable on its way, which is larger than that of a value near 0,
+    /// takes it there, too.
+    fn is_bounded_around(&mut self, path: &Path, atom: usize, at: f64) -> bool {
+        path.over(0.0, 1.0, &mut self.bounds);
+        let sizes: SmallVec<[f64; 16]> = self.bounds.iter().map(|bounds| bounds.value.magnitude()).collect();
+        self.widened_by(path, atom, at, &sizes).bounded
+    }
+
+    /// The effect of the rounding of the variables on the difference of two sides; 0 where the difference jumps.
+    pub(super) fn rounding(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        let Widened { width, size, .. } = self.widened(path, atom, at);
+        // A larger effect is that of a jump.
+        if width <= NOISE * size.max(1.0) { width } else { 0.0 }
+    }
+
+    /// The effect of the rounding of the variables on the difference of two sides, however large.
+    pub(super) fn rounding_width(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        let Widened { width, bounded, .. } = self.widened(path, atom, at);
+        if bounded { width } else { f64::INFINITY }
+    }
+
+    /// What the rounding of the variables does to two sides.
+    fn widened(&mut self, path: &Path, atom: usize, at: f64) -> Widened {
+        self.widened_by(path, atom, at, &[])
+    }
+
+    /// The same of variables that are rounded as if they were of these sizes, or of their own, if that is larger.
+    fn widened_by(&mut self, path: &Path, atom: usize, at: f64, sizes: &[f64]) -> Widened {
+        path.over(at, at, &mut self.bounds);
+        for (number, variable) in self.bounds.iter_mut().enumerate() {
+            let size = sizes.get(number).copied().unwrap_or(0.0).max(variable.value.magnitude());
+            let width = 64.0 * f64::EPSILON * size;
+            variable.value.lo -= width;
+            variable.value.hi += width;
+        }
+        let sides = &path.rule.sides;
+        self.bounds_out.resize(sides.outputs(), Dual::constant(0.0));
+        sides.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
+        let [a, b] = [0, 1].map(|side| self.bounds_out[2 * atom + side].value);
+        let width = (a.hi - a.lo) + (b.hi - b.lo);
+        let bounded = width.is_finite() && !a.is_empty() && !b.is_empty() && !a.partial && !b.partial;
+        Widened { width, size: a.magnitude().max(b.magnitude()), bounded }
     }
 
     /// The crossing at which a variable that moves monotonically takes the level at which its atom's sides meet.

@@ -22,11 +22,11 @@
 //! ([`about_to_meet`](CrossingDetector::about_to_meet)), with a warning if they are not much nearer than that.
 
 use crate::detect::crossing::{Crossing, CrossingDetector};
-use crate::detect::signs::{opposite, sign_of};
+use crate::detect::signs::{half_width, opposite, sign_of};
 use crate::detect::switched;
-use crate::world::path::Path;
-use dlsys_expr::{Dual, Interval};
-use dlsys_model::Sign;
+use crate::world::path::{NEXT_TO_NOTHING, Path};
+use dlsys_expr::{Dual, Interval, Value};
+use dlsys_model::{Sign, ZeroCrossing};
 use dlsys_ode::{Function, first_root};
 
 /// The rate of a difference at a position is bounded over this part of the path on both sides of it.
@@ -40,9 +40,6 @@ const SLOW: f64 = 10.0;
 
 /// A difference that is this many times larger than the error of its sides lies surely outside the band.
 pub const FAR: f64 = 1e3;
-
-/// A difference among others that is larger is not next to nothing, whatever its sides are multiplied by.
-const SMALL: f64 = 1e-9;
 
 /// The band of a difference of values of neighbours is at least this many roundings wide.
 const BLUR: f64 = 4.0;
@@ -115,6 +112,9 @@ impl<F: Function> Function for Raised<'_, F> {
     }
 }
 
+/// Sides that read more variables have bounds by terms.
+const MANY_READS: usize = 8;
+
 impl CrossingDetector {
     /// The place up to which a difference that is zero at `from`, but for rounding, is nothing else, and its value there; None if it then has not the
     /// sign that it was said to get, or if a root that was found is beyond. What does not move at once (`dx/dt = age`) is rounding much longer than
@@ -154,8 +154,7 @@ impl CrossingDetector {
         let [a, b] = [self.out[2 * atom], self.out[2 * atom + 1]];
         // `x - y` and 0 are small where `x` and `y` are not.
         let size = self.values.iter().fold(a.abs().max(b.abs()), |m, x| m.max(x.abs()));
-        let least = if path.reads_others() { SMALL } else { 0.0 };
-        let is_far = start.abs() > (FAR * query.error * size).max(least);
+        let is_far = start.abs() > FAR * query.error * size;
         let noise = if is_far { 0.0 } else { self.noise(path, atom, query.from) };
         // The value of a neighbour is approached only numerically, and rounding may make the sides equal at last.
         let around = path.rule.reads_context
@@ -415,6 +414,63 @@ impl CrossingDetector {
             from = root.position;
         }
         None
+    }
+
+    /// Half the width of the band: the effect of the errors of integration and rounding on the difference of two sides.
+    /// 0 where the difference jumps.
+    pub(super) fn noise(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        path.uncertain(at, &mut self.around);
+        let sides = &path.rule.sides;
+        self.around_out.resize(sides.outputs(), Interval::EMPTY);
+        sides.eval(&self.around, &mut self.whole_scratch, &mut self.around_out);
+        let (a, b) = (self.around_out[2 * atom], self.around_out[2 * atom + 1]);
+        let width = half_width(a, b);
+        let is_sum = matches!(
+            path.rule.zero_crossings(path.state.solve.get())[atom],
+            ZeroCrossing::Search { sum: Some(_), .. }
+        );
+        // By each term for itself, bounds of what is written out (`x^2 - 2*x + 1`) are far too wide.
+        let width = if is_sum || width == 0.0 { width } else { width.min(self.sensitivity(path, atom, at)) };
+        // What stands alone, or is compared with another number than 0, may be next to nothing and follow its own size all the same; of two that
+        // differ by less than what is followed nobody knows which is larger, and of one that no influence has reached yet not that it is not below 0.
+        let may_be_nothing = |side: Interval| half_width(side, side) > 0.0 || side.magnitude() == 0.0;
+        let is_tiny = path.reads_others()
+            && width < path.error() * NEXT_TO_NOTHING
+            && may_be_nothing(a)
+            && may_be_nothing(b);
+        let width = if is_tiny { width.max(self.noise_on_the_way(path, atom, at)) } else { width };
+        // A wider one is that of a jump.
+        let is_jump = || width > FAR * path.error() * a.magnitude().max(b.magnitude()).max(1.0);
+        if path.rule.jumping_whole[atom] && is_jump() { 0.0 } else { width }
+    }
+
+    /// The same by the mean value theorem: the errors of the variables, which are those around their values, times the partial derivatives, and
+    /// the effect of rounding; infinite where that says nothing.
+    fn sensitivity(&mut self, path: &Path, atom: usize, at: f64) -> f64 {
+        let (reads, sides) = (&path.rule.atom_reads[atom], &path.rule.sides);
+        if reads.len() > MANY_READS {
+            return f64::INFINITY;
+        }
+        let around = std::mem::take(&mut self.around);
+        let mut all = 0.0;
+        for &variable in reads {
+            let error = 0.5 * (around[variable].hi - around[variable].lo);
+            if error == 0.0 {
+                continue;
+            }
+            self.bounds.clear();
+            self.bounds
+                .extend(around.iter().map(|value| Dual { value: *value, rate: Interval::constant(0.0) }));
+            self.bounds[variable].rate = Interval::constant(error);
+            self.bounds_out.resize(sides.outputs(), Dual::constant(0.0));
+            sides.eval(&self.bounds, &mut self.bounds_scratch, &mut self.bounds_out);
+            let [a, b] = [0, 1].map(|side| self.bounds_out[2 * atom + side].rate);
+            let moved = (a.hi - b.lo).abs().max((a.lo - b.hi).abs());
+            let is_known = !a.partial && !b.partial && !a.is_empty() && !b.is_empty() && moved.is_finite();
+            all += if is_known { moved } else { f64::INFINITY };
+        }
+        self.around = around;
+        all + if all.is_finite() { self.rounding_width(path, atom, at) } else { 0.0 }
     }
 
     /// How far the sides of an atom are apart at the start of a path, as a part of `factor` times the error of integration, if that is no more than 1

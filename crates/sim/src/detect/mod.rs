@@ -3,14 +3,12 @@
 //! - [`search`]: the next event of a module on a stretch. Begin here.
 //! - [`crossing`]: the crossings of one atom, by formula or by root isolation; [`level`]: the same where it compares an integrated
 //!   parameter with a number, as most do
-//! - [`band`]: how near zero a difference has no sign
 //! - [`doubt`]: crossings that the error of integration may hide or feign; [`limit`]: those that rounding feigns
 //! - [`quiet`]: a short test that spares most searches
 //! - [`pulse`]: rates that are large between the stages of a step; [`calm`]: a short test that spares most of that;
 //!   [`examined`]: what both are told of a step
 //! - [`signs`]: signs of the differences that conditions compare, and their consequences; [`switched`]: those by way of a value
 
-mod band;
 pub mod calm;
 pub mod crossing;
 pub mod doubt;

@@ -6,8 +6,7 @@
 use super::EventStage;
 use super::modes::FAR_AWAY;
 use crate::detect::signs::{NEAR, noise, opposite, sign_at_birth};
-use crate::world::path::Path;
-use crate::world::sizes::NEXT_TO_NOTHING;
+use crate::world::path::NEXT_TO_NOTHING;
 use crate::world::state::Signs;
 use dlsys_expr::Dual;
 use dlsys_model::{Rule, Sign};
@@ -53,8 +52,7 @@ impl EventStage<'_, '_> {
             let reads =
                 |variable: &usize| rule.solves.iter().any(|solve| solve.rates.reads().contains(variable));
             let others = context.filter(reads).map(|variable| moving[variable]).filter(|x| x.rate != 0.0);
-            let around = others.map(|x| x.value.abs() + x.rate.abs() * reach).fold(0.0, f64::max);
-            error * around
+            error * others.map(|x| x.value.abs() + x.rate.abs() * reach).fold(0.0, f64::max)
         } else {
             0.0
         };
@@ -72,13 +70,10 @@ impl EventStage<'_, '_> {
             if entry.at[atom] != Sign::Zero {
                 continue;
             }
-            let unclear = match entry.guess[atom] {
-                Sign::Zero if has_rested => least_way.max(unrest).max(self.least_difference(id, rule, atom)),
-                _ => least_way,
-            };
             let clear = |slope: f64, least: f64| {
                 let way = slope.abs() * reach;
-                if way > least * size && way > unclear { Sign::of(slope) } else { Sign::Zero }
+                let noise = if entry.guess[atom] == Sign::Zero { least_way.max(unrest) } else { least_way };
+                if way > least * size && way > noise { Sign::of(slope) } else { Sign::Zero }
             };
             // What was at zero, and is beyond it by more than its noise without having been seen to leave, has not come back yet.
             let has_left = |towards: Sign| {
@@ -162,13 +157,6 @@ impl EventStage<'_, '_> {
                 after[atom] = sign;
             }
         }
-    }
-
-    /// The difference of an atom's sides that is next to nothing beside what is integrated together.
-    pub(super) fn least_difference(&self, id: ModuleId, rule: &Rule, atom: usize) -> f64 {
-        let Some(state) = self.world.state(id) else { return 0.0 };
-        let now = self.instant.at;
-        Path::new(self.world, state, rule, now, now.resolution()).least_difference_of(atom)
     }
 
     /// The size of a module's parameters, against which a tiny one is as good as zero.

@@ -7,7 +7,7 @@ use super::levels::put_levels;
 use crate::detect::crossing::TOUCH;
 use crate::detect::signs::{EQUAL, NEAR, noise, opposite};
 use crate::world::context::Context;
-use crate::world::sizes::NEXT_TO_NOTHING;
+use crate::world::path::NEXT_TO_NOTHING;
 use crate::world::state::Signs;
 use dlsys_model::{ContextPart, Pattern, Rule, Sign};
 use dlsys_tree::ModuleId;
@@ -172,13 +172,7 @@ impl EventStage<'_, '_> {
                 };
                 let equal = size.is_finite() && (difference.abs() <= tolerance * size || is_rounding());
                 // Next to nothing there is no sign but the one that it had.
-                let is_nothing = || {
-                    difference.abs() <= least
-                        || error > 0.0
-                            && difference.abs() <= NEXT_TO_NOTHING
-                            && difference.abs() <= self.least_difference(id, rule, atom)
-                };
-                if let Some((signs, _)) = followed.as_ref().filter(|_| !equal && is_nothing()) {
+                if let Some((signs, _)) = followed.as_ref().filter(|_| !equal && difference.abs() <= least) {
                     clear = false;
                     return signs[atom];
                 }

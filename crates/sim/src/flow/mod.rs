@@ -103,7 +103,7 @@ impl Flows {
     }
 
     /// The relative error of the values that a module reads, inside the common step, too; 0 of one that stands alone, whose values are followed to their own
-    /// accuracy. Differences below [`NEXT_TO_NOTHING`](crate::world::sizes::NEXT_TO_NOTHING) times that have no sign.
+    /// accuracy. Differences below [`NEXT_TO_NOTHING`](crate::world::path::NEXT_TO_NOTHING) times that have no sign.
     pub fn error_among_others(&self, world: &World, id: ModuleId) -> f64 {
         if !world.state(id).is_some_and(Path::is_among_others) {
             return 0.0;

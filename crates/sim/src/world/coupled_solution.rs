@@ -5,7 +5,6 @@ use dlsys_ode::{Coefficients, Dense};
 use dlsys_tree::{SimTime, room};
 
 use crate::world::prefetch::fetch;
-use crate::world::sizes::Sizes;
 
 /// The trajectory of all components from the last common step to its end.
 #[derive(Clone, Debug)]
@@ -22,7 +21,6 @@ pub struct CoupledSolution {
     pub end: SimTime,
     /// The estimated relative error of the components, in the worst of the stretches.
     pub error: f64,
-    pub sizes: Sizes,
 }
 
 /// The stretches, one after another, in which a component is found, and its number there.
@@ -56,8 +54,7 @@ impl CoupledSolution {
     pub fn new(step: Dense) -> CoupledSolution {
         let (end, error) = (step.end, step.error);
         let stretches = vec![step];
-        let (free, tracks, sizes) = Default::default();
-        CoupledSolution { stretches, followers: vec![ALL], free, tracks, end, error, sizes }
+        CoupledSolution { stretches, followers: vec![ALL], free: Vec::new(), tracks: Vec::new(), end, error }
     }
 
     /// The components of a common step that is several stretches.
@@ -69,14 +66,7 @@ impl CoupledSolution {
             if count == 1 { Vec::new() } else { (0..stretches[0].components() as u32).map(track).collect() };
         let error = stretches.iter().map(|dense| dense.error).fold(0.0, f64::max);
         let followers = vec![ALL; stretches.len()];
-        let (free, sizes) = Default::default();
-        CoupledSolution { stretches, followers, free, tracks, end, error, sizes }
-    }
-
-    /// A bound of a component over the common step, whatever has been integrated again since; None for one that was not there.
-    pub fn largest(&self, component: usize) -> Option<f64> {
-        let step = &self.stretches[0];
-        (component < step.components()).then(|| step.bounds(component).magnitude())
+        CoupledSolution { stretches, followers, free: Vec::new(), tracks, end, error }
     }
 
     /// The start of the common step.

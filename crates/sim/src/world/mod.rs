@@ -4,7 +4,6 @@
 //! - [`state`], [`states`]: rule, clause, signs and switches ([`marks`], [`short`]), trajectories and next event of one module, and of all of them
 //! - [`trajectories`]: how the parameters of one module move
 //! - [`path`], [`course`]: the variables of a rule along a stretch of time, and at one instant after another
-//! - [`sizes`]: how large values are, and what is next to nothing beside them
 //! - [`prefetch`]: memory that is asked for before it is read
 //! - [`context`], [`neighbours`]: the modules that a rule reads, and the modules that read one
 //! - [`life`]: lazy modules
@@ -19,7 +18,6 @@ pub mod new_modules;
 pub mod path;
 pub mod prefetch;
 mod short;
-pub mod sizes;
 pub mod state;
 pub mod states;
 pub mod trajectories;

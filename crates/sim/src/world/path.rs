@@ -4,7 +4,6 @@ use super::World;
 use super::context::gather;
 use crate::trajectory::Trajectory;
 use crate::world::coupled_solution::DenseComponent;
-use crate::world::sizes::NEXT_TO_NOTHING;
 use crate::world::state::State;
 use crate::world::trajectories::Law;
 use dlsys_expr::{Dual, Interval, Value};
@@ -34,6 +33,9 @@ pub struct Path<'p> {
     /// The module's own step, if it is not stored in its state yet.
     step: Option<&'p Dense>,
 }
+
+/// Values that are much smaller are not followed to their own accuracy; see the step control of `dlsys_ode`.
+pub const NEXT_TO_NOTHING: f64 = 1e-17;
 
 impl<'p> Path<'p> {
     pub fn new(world: &'p World, state: &'p State, rule: &'p Rule, start: SimTime, h: f64) -> Path<'p> {
@@ -263,25 +265,6 @@ impl<'p> Path<'p> {
             |trajectory, x, offset| exactly(trajectory.at(x, offset + tau)),
             |t| exactly(t + tau),
         );
-        for (variable, value) in out.iter_mut().enumerate().take(self.rule.first_aggregate) {
-            let least = self.least_difference(variable);
-            (value.lo, value.hi) = (value.lo - least, value.hi + least);
-        }
-    }
-
-    /// What is next to nothing for a variable; 0 for one that is not integrated together with others.
-    fn least_difference(&self, variable: usize) -> f64 {
-        match self.law_of(variable) {
-            Some(Law::Coupled(_)) => self.place_of(variable).map_or(0.0, |(id, parameter)| {
-                self.world.next_to_nothing(self.world.tree.kind(id), parameter)
-            }),
-            _ => 0.0,
-        }
-    }
-
-    /// The same for the difference of an atom's sides.
-    pub fn least_difference_of(&self, atom: usize) -> f64 {
-        self.rule.atom_reads[atom].iter().map(|variable| self.least_difference(*variable)).sum()
     }
 
     /// False for modules that stand alone, whose values are followed to their own accuracy however small they are.
