@@ -82,31 +82,34 @@ impl Detector {
                 .at(rule.span, "these equations")
                 .help("a rate that is very large there for a very short time may be overlooked: see what is divided by, or taken the logarithm of, or compare with `--method rk4 --step-size H`")
         };
-        let boundary = |rule: usize, atom: usize| {
-            let boundary = model.rules[rule].boundaries[atom].to_string();
-            if boundary.is_empty() { "a boundary".to_string() } else { boundary }
+        // `tell` gets the rule and the boundary of the atom.
+        let about =
+            |(rule, atom): (usize, usize), tell: &dyn Fn(&str, &str) -> String, label: &str, help: &str| {
+                let rule = &model.rules[rule];
+                let boundary = rule.boundaries[atom].to_string();
+                let boundary = if boundary.is_empty() { "a boundary" } else { &boundary };
+                Diagnostic::warning(tell(&rule.label, boundary)).at(rule.atoms[atom], label).help(help)
+            };
+        let near = |(&place, &(t, _)): (&(usize, usize), &(f64, usize))| {
+            let tell = |rule: &str, boundary: &str| {
+                format!(
+                    "{rule} comes so near {boundary} by t = {} that the error of integration does not tell whether it meets it",
+                    brief(t, 6)
+                )
+            };
+            let help = "a smaller `--tolerance` tells more; if what comes near is to count, say how near: `if x >= y - 1e-5`";
+            about(place, &tell, "as long as that is so, nothing follows", help)
         };
-        let near = |(&(rule, atom), &(t, _)): (&(usize, usize), &(f64, usize))| {
-            let boundary = boundary(rule, atom);
-            let rule = &model.rules[rule];
-            Diagnostic::warning(format!(
-                "{} comes so near {boundary} by t = {} that the error of integration does not tell whether it meets it",
-                rule.label,
-                brief(t, 6)
-            ))
-            .at(rule.atoms[atom], "as long as that is so, nothing follows")
-            .help("a smaller `--tolerance` tells more; if what comes near is to count, say how near: `if x >= y - 1e-5`")
-        };
-        let joined = |(&(rule, atom), &t): (&(usize, usize), &f64)| {
-            let boundary = boundary(rule, atom);
-            let rule = &model.rules[rule];
-            Diagnostic::warning(format!(
-                "{} is so near {boundary} at an event of its neighbour, t = {}, that the error of integration does not tell which is first",
-                rule.label,
-                brief(t, 6)
-            ))
-            .at(rule.atoms[atom], "both happen at that time")
-            .help("a smaller `--tolerance` tells more; if both are meant to happen together, all is well")
+        let joined = |(&place, &t): (&(usize, usize), &f64)| {
+            let tell = |rule: &str, boundary: &str| {
+                format!(
+                    "{rule} is so near {boundary} at an event of its neighbour, t = {}, that the error of integration does not tell which is first",
+                    brief(t, 6)
+                )
+            };
+            let help =
+                "a smaller `--tolerance` tells more; if both are meant to happen together, all is well";
+            about(place, &tell, "both happen at that time", help)
         };
         let approached = self.approached.iter().map(near);
         self.unbounded.iter().map(remark).chain(approached).chain(self.joined.iter().map(joined)).collect()
