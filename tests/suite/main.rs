@@ -28,6 +28,7 @@ mod glb;
 mod glb_reader;
 mod groups;
 mod inspect;
+mod instants;
 mod jumps;
 mod land;
 mod language;

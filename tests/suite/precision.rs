@@ -2,10 +2,9 @@
 //! thresholds that almost coincide, shared instants, singularities.
 
 use dlsys::sim::{Error, Method, Settings};
-use dlsys::tree::ModuleString;
 use proptest::prelude::*;
 
-use crate::common::{plain, run, session, show};
+use crate::common::{run, show};
 use crate::semantics::{expect, fails, time_of_event};
 
 #[test]
@@ -541,36 +540,6 @@ fn empty_cells_are_not_below_zero() {
                 }
             }
         }
-    }
-}
-
-/// An event of a neighbour would keep Q from the level that it is about to reach. Within the error of integration both happen together, as what is one instant
-/// has to; where they are not surely one, a warning says so.
-#[test]
-fn what_is_taken_for_one_instant_is_said() {
-    // The integral of x/(1 + sin(x)/10) from 0 to 1.
-    let reached = 0.471_749_986_593_199_06;
-    let outcome = |level: f64, tolerance: f64| {
-        let text = format!(
-            "initial string: P(0) Q(0)\nP(x): solve dx/dt = 1 + 0.1*sin(x)\n if x = 1 produce R\nP(x) < Q(y): solve dy/dt = x\n if y = {level} produce S\nR < Q(y): solve dy/dt = -1\n if y = {level} produce S"
-        );
-        let session = session(&text);
-        let settings = Settings { tolerance, ..Settings::default() };
-        let mut simulation = session.simulate(settings).expect("a model");
-        let mut string = ModuleString::default();
-        simulation.at(1.2, &mut string).expect("a string");
-        let joined = plain(&session.model, &string).iter().any(|module| module.0 == "S");
-        let warns = simulation.remarks().iter().any(|warning| warning.message.contains("which is first"));
-        (joined, warns)
-    };
-    for tolerance in [1e-3, 1e-5, 1e-7] {
-        let (joined, warns) = outcome(reached, tolerance);
-        // Where steps are so long that their estimate is all that there is, a warning is in place.
-        assert!(joined && (!warns || tolerance == 1e-3), "{tolerance:e}: one instant");
-        assert_eq!(outcome(reached + tolerance, tolerance), (false, false), "{tolerance:e}: never");
-        let steps = (0..60).map(|step| reached + tolerance * 0.7f64.powi(step));
-        let farthest = steps.map(|level| outcome(level, tolerance)).find(|(joined, _)| *joined);
-        assert_eq!(farthest, Some((true, true)), "{tolerance:e}");
     }
 }
 

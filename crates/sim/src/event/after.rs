@@ -7,6 +7,7 @@
 
 use super::{EventStage, Firing, chance};
 use crate::world::new_modules::NewModules;
+use crate::world::state::Open;
 use dlsys_expr::Dual;
 use dlsys_model::{Sign, Truth};
 use dlsys_tree::{Family, ModuleId};
@@ -50,6 +51,21 @@ impl EventStage<'_, '_> {
         let rule = &self.setup.model.rules[rule];
         let has_jumped = |atom: usize| self.events.is_after && at[atom] == Sign::Zero && rule.jumping[atom];
         let sign = |atom: usize| if has_jumped(atom) { Sign::Any } else { at[atom] };
+        rule.produces.iter().position(|produce| produce.guard.judge(sign) == Truth::Yes)
+    }
+
+    /// The production that holds just after the instant, of a module that was followed to its own jump there, once the instant has been put behind
+    /// the jump of another: both happen together.
+    pub(super) fn production_behind(&self, rule: usize, open: &Open) -> Option<usize> {
+        if !self.events.is_after || open.flow.is_none() {
+            return None;
+        }
+        let rule = &self.setup.model.rules[rule];
+        let sign = |atom: usize| match open.at[atom] {
+            Sign::Zero if rule.jumping[atom] && open.guess[atom] == Sign::Zero => Sign::Any,
+            Sign::Zero if rule.jumping[atom] => open.guess[atom],
+            at => at,
+        };
         rule.produces.iter().position(|produce| produce.guard.judge(sign) == Truth::Yes)
     }
 

@@ -10,7 +10,7 @@ use super::EventStage;
 use super::levels::put_levels;
 use crate::detect::signs::opposite;
 use crate::world::path::Path;
-use crate::world::state::{Change, Signs};
+use crate::world::state::{Change, Next, NextKind, Signs};
 use dlsys_expr::Dual;
 use dlsys_model::{Comparison, Model, Rule, Sign, Truth};
 use dlsys_tree::{ModuleId, SimTime};
@@ -130,6 +130,11 @@ impl<'m> EventStage<'_, 'm> {
         let mut delay = at.resolution().max(SHORTEST_DELAY).max(waited);
         while delay <= longest {
             if is_past(self, delay) {
+                let is_whole = |change: &Change| self.setup.model.rules[rule].jumping_whole[change.atom()];
+                if !touched.iter().any(is_whole) && self.has_event_beside(id) {
+                    let then: Vec<Sign> = touched.iter().map(|change| change.after).collect();
+                    return self.at_the_numbers(touched, &question.jumps, &then);
+                }
                 return When::Later(at.after(delay));
             }
             delay *= 2.0;
@@ -154,7 +159,7 @@ impl<'m> EventStage<'_, 'm> {
         let met: Vec<Change> = (touched.iter().copied())
             .filter(|change| change.at == Sign::Zero && is_around(change.atom()))
             .collect();
-        if met.is_empty() {
+        if met.is_empty() || self.has_event_beside(id) {
             return When::Now;
         }
         let is_integrated = self.is_integrated(id, rule, &met, &vec![true; met.len()]);
@@ -178,6 +183,21 @@ impl<'m> EventStage<'_, 'm> {
             delay *= 2.0;
         }
         When::Now
+    }
+
+    /// True if a module that this one reads, or one that reads it, has its own event now: put off, one would find the other replaced.
+    fn has_event_beside(&self, id: ModuleId) -> bool {
+        self.setup.looks_around && self.around(id).iter().any(|beside| self.has_event_now(*beside))
+    }
+
+    /// True if the instant concerns a module, or will once all of its batch are opened.
+    fn has_event_now(&self, id: ModuleId) -> bool {
+        let now = self.instant.at;
+        let is_next = |next: &Next| {
+            next.kind == NextKind::Event
+                && next.touched().iter().any(|change| change.time.since(now) <= now.resolution())
+        };
+        self.takes_place(id) || self.world.state(id).is_some_and(|state| is_next(&state.next))
     }
 
     /// Gives signs that are zero at the instant, of differences of several variables that move, a variable and its number at which
@@ -241,7 +261,8 @@ impl<'m> EventStage<'_, 'm> {
         jumping.any(|(change, _)| path.is_integrated(&of_rule.atom_reads[change.atom()]))
     }
 
-    /// The signs of differences a little later, where all that moves has not come as far by this part of its size.
+    /// The signs of differences a little later, where all that moves has not come as far by this part of its size. What a neighbour has at its own event
+    /// is known.
     fn signs_later(
         &mut self,
         id: ModuleId,
@@ -252,10 +273,15 @@ impl<'m> EventStage<'_, 'm> {
     ) -> Vec<Sign> {
         let mut moving: Vec<Dual<f64>> = Vec::new();
         self.flow().moving_variables(id, delay, &mut moving);
-        let back =
-            |v: &Dual<f64>| if v.rate == 0.0 { 0.0 } else { clearance * v.value.abs() * v.rate.signum() };
-        let values: Vec<f64> = moving.iter().map(|variable| variable.value - back(variable)).collect();
-        signs(&self.setup.model.rules[index], touched, &values, &mut self.scratch.registers)
+        let rule = &self.setup.model.rules[index];
+        let state = self.world.state(id).expect("scheduled");
+        let path = Path::new(self.world, state, rule, self.instant.at, 0.0);
+        let back = |variable: usize, v: &Dual<f64>| {
+            let moves = v.rate != 0.0 && path.moves(variable);
+            if moves { clearance * v.value.abs() * v.rate.signum() } else { 0.0 }
+        };
+        let values: Vec<f64> = moving.iter().enumerate().map(|(i, v)| v.value - back(i, v)).collect();
+        signs(rule, touched, &values, &mut self.scratch.registers)
     }
 }
 

@@ -111,8 +111,12 @@ impl EventStage<'_, '_> {
             }
             let state = world.state(id)?;
             let (rule, open) = (state.rule.get()?, state.open.as_ref()?);
-            let produce = self.production_at(rule, &open.at)?;
-            Some(Firing { id, rule, produce, after: open.behind && self.setup.jumps[rule][produce] })
+            if let Some(produce) = self.production_at(rule, &open.at) {
+                let after = open.behind && self.setup.jumps[rule][produce];
+                return Some(Firing { id, rule, produce, after });
+            }
+            let produce = self.production_behind(rule, open)?;
+            Some(Firing { id, rule, produce, after: self.setup.jumps[rule][produce] })
         }));
         firing
     }

@@ -14,6 +14,9 @@ use crate::world::state::{Change, Level, NextKind, Open, State};
 use dlsys_model::{Sign, Truth, ZeroCrossing};
 use dlsys_tree::ModuleId;
 
+/// See [`EventStage::turn`].
+const LAST_TURN: u8 = 2;
+
 impl EventStage<'_, '_> {
     /// Opens everything that happens at one instant; returns the first module of it.
     pub fn open_batch(&mut self, batch: &[NextEvent]) -> Result<Option<ModuleId>, Error> {
@@ -21,14 +24,15 @@ impl EventStage<'_, '_> {
             NextEvent::Lazy(..) => true,
             NextEvent::Other(entry) => entry.owner == Owner::Derivation,
         });
+        let ties = self.find_ties(batch);
         let mut oldest = None;
         // Whoever asks on which side of a jump it is asks the levels that others meet, not roundings of them.
-        let asks: SmallVec<[bool; 8]> = match batch {
-            [_] => SmallVec::from_slice(&[false]),
-            _ => batch.iter().map(|next| self.asks_for_a_jump(next)).collect(),
+        let turns: SmallVec<[u8; 8]> = match batch {
+            [_] => SmallVec::from_slice(&[0]),
+            _ => batch.iter().map(|next| self.turn(next)).collect(),
         };
-        let of = |late: bool| batch.iter().zip(&asks).filter(move |(_, asks)| **asks == late);
-        for (next, _) in of(false).chain(of(true)) {
+        let of = |turn: u8| batch.iter().zip(&turns).filter(move |(_, own)| **own == turn);
+        for (next, _) in (0..=LAST_TURN).flat_map(of) {
             let owner = match *next {
                 NextEvent::Lazy(_, slot) if all_lazy => {
                     self.events.firing_lazy.push(slot);
@@ -59,18 +63,23 @@ impl EventStage<'_, '_> {
             };
             oldest = oldest.or(first);
         }
-        self.join_ties();
+        self.join_ties(&ties);
         Ok(oldest)
     }
 
-    /// True for the event of a module at which something jumps that was not taken apart into what moves.
-    fn asks_for_a_jump(&self, next: &NextEvent) -> bool {
-        let NextEvent::Other(entry) = next else { return false };
-        let Owner::Module(slot) = entry.owner else { return false };
-        let Some(state) = self.world.states.get(slot as usize) else { return false };
-        let Some(rule) = state.rule.get().filter(|rule| self.setup.has_jumps[*rule]) else { return false };
-        let rule = &self.setup.model.rules[rule];
-        state.next.touched().iter().any(|change| rule.jumping_whole[change.atom()])
+    /// When an event is opened among those of its instant. One at which something jumps that was not taken apart into what moves comes late, and last if
+    /// it brings no level of its own.
+    fn turn(&self, next: &NextEvent) -> u8 {
+        let NextEvent::Other(entry) = next else { return 0 };
+        let Owner::Module(slot) = entry.owner else { return 0 };
+        let Some(state) = self.world.states.get(slot as usize) else { return 0 };
+        let Some(rule) = state.rule.get().filter(|rule| self.setup.has_jumps[*rule]) else { return 0 };
+        let (rule, touched) = (&self.setup.model.rules[rule], state.next.touched());
+        match touched.iter().any(|change| rule.jumping_whole[change.atom()]) {
+            false => 0,
+            true if touched.iter().any(|change| change.level().is_some()) => 1,
+            true => LAST_TURN,
+        }
     }
 
     /// Opens a module because of signs that are zero now.

@@ -6,6 +6,7 @@ use crate::detect::doubt::FAR;
 use crate::detect::signs::{opposite, produces};
 use crate::detect::switched;
 use crate::flow::algebraic::is_algebraic;
+use crate::schedule::{NextEvent, Owner};
 use crate::world::path::Path;
 use crate::world::state::{Change, NextKind, Signs};
 use dlsys_model::Sign;
@@ -19,34 +20,97 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 /// cases that have such.
 const SURE: f64 = 0.1;
 
+/// The event of a module beside one which has its event now, and which is not later by more than the error.
+pub(super) struct Tie {
+    /// The module that has its event now.
+    with: ModuleId,
+    id: ModuleId,
+    change: Change,
+    /// How far the sides are apart, as a part of the error.
+    apart: f64,
+}
+
 impl EventStage<'_, '_> {
-    /// Opens the modules that read one that has an event now, and whose own event is not later by more than the error.
-    pub fn join_ties(&mut self) {
+    /// The modules that read those that have their events now or are read by them, and whose own events are not later by more than the error. To be
+    /// asked for before anything is opened: what is opened rests, and then nothing comes nearer its values.
+    pub(super) fn find_ties(&mut self, batch: &[NextEvent]) -> SmallVec<[Tie; 2]> {
+        let mut ties = SmallVec::new();
         if !self.setup.looks_around {
-            return;
+            return ties;
+        }
+        let mut happening: SmallVec<[ModuleId; 8]> = self.events.opened.iter().copied().collect();
+        happening.extend(self.events.firing.iter().map(|fire| fire.id));
+        happening.extend(batch.iter().filter_map(|next| self.module_of(next)));
+        let visit = self.flows.coupled.reintegration.begin_visit(&mut self.world.states);
+        for id in &happening {
+            if let Some(state) = self.world.state_mut(*id) {
+                state.visited = visit;
+            }
         }
         let mut known = 0;
         // Those that join may be looked at, too.
-        while known < self.events.opened.len() + self.events.firing.len() {
-            let id = match self.events.opened.get(known) {
-                Some(id) => *id,
-                None => self.events.firing[known - self.events.opened.len()].id,
-            };
+        while known < happening.len() {
+            let with = happening[known];
             known += 1;
-            let other = self.flows.error_of(self.world, id);
-            for looker in self.lookers_through_values(id) {
-                if let Some(change) = self.tie(looker, other) {
-                    let mut changes = [change];
-                    let when = self.behind_jumps(looker, &mut changes);
-                    if let When::Later(_) = when {
-                        continue;
-                    }
-                    let before = self.events.opened.len();
-                    self.touch_then(looker, &changes, when);
-                    known = if self.events.opened.len() > before && known > before { before } else { known };
+            let other = self.flows.error_of(self.world, with);
+            for id in self.around(with) {
+                if let Some((change, apart)) = self.tie(id, other, visit) {
+                    ties.push(Tie { with, id, change, apart });
+                    happening.push(id);
+                    self.world.state_mut(id).expect("it has an event").visited = visit;
                 }
             }
         }
+        ties
+    }
+
+    /// The module whose event it is.
+    fn module_of(&self, next: &NextEvent) -> Option<ModuleId> {
+        let slot = match next {
+            NextEvent::Lazy(_, slot) => *slot,
+            NextEvent::Other(entry) => match entry.owner {
+                Owner::Module(slot) => slot,
+                Owner::Coupled | Owner::Tick | Owner::Derivation => return None,
+            },
+        };
+        Some(self.world.tree.id(slot))
+    }
+
+    /// Opens the modules of ties, where the event that they are tied to takes place now.
+    pub(super) fn join_ties(&mut self, ties: &[Tie]) {
+        for tie in ties {
+            if !self.takes_place(tie.with) || self.takes_place(tie.id) {
+                continue;
+            }
+            let mut changes = [tie.change];
+            let when = self.behind_jumps(tie.id, &mut changes);
+            if let When::Later(_) = when {
+                continue;
+            }
+            if let (true, Some(rule)) =
+                (tie.apart > SURE, self.world.state(tie.id).and_then(|s| s.rule.get()))
+            {
+                self.detector.note_joined(
+                    self.setup.model.rules[rule].index,
+                    tie.change.atom(),
+                    self.instant.at,
+                );
+            }
+            self.touch_then(tie.id, &changes, when);
+        }
+    }
+
+    /// True for a module that has been opened, or whose production is known to apply now.
+    pub(super) fn takes_place(&self, id: ModuleId) -> bool {
+        self.world.state(id).is_some_and(|state| state.open.is_some())
+            || self.events.firing.iter().any(|fire| fire.id == id)
+    }
+
+    /// The modules that a module reads, and those that read it.
+    pub(super) fn around(&self, id: ModuleId) -> SmallVec<[ModuleId; 8]> {
+        let mut around = self.lookers_through_values(id);
+        around.extend(self.world.state(id).into_iter().flat_map(|state| state.context.iter().copied()));
+        around
     }
 
     /// The modules that read a module, and those that read it through values of modules that read it.
@@ -66,9 +130,9 @@ impl EventStage<'_, '_> {
     }
 
     /// The production of a module that is not later than now by more than the error, beside an event of a module whose
-    /// values have the error `other`.
-    fn tie(&mut self, id: ModuleId, other: f64) -> Option<Change> {
-        let state = self.world.state(id).filter(|s| s.open.is_none())?;
+    /// values have the error `other`, and how far its sides are apart, as a part of the error; None of those that `visit` has come by.
+    fn tie(&mut self, id: ModuleId, other: f64, visit: u32) -> Option<(Change, f64)> {
+        let state = self.world.state(id).filter(|state| state.visited != visit)?;
         let rule = &self.setup.model.rules[state.rule.get()?];
         if rule.produces.is_empty() || rule.atoms.is_empty() {
             return None;
@@ -86,6 +150,9 @@ impl EventStage<'_, '_> {
             0.0 if self.setup.is_algebraic => ROUNDING,
             error => error,
         };
+        if let Some(tie) = self.tie_of_jump(id, other) {
+            return Some(tie);
+        }
         let reach = self.flows.reach_of(self.world, id);
         let factor = if error > 0.0 { 1.0 + other / error } else { 0.0 };
         if known.since(self.instant.at) > FAR * factor * error * reach.max(self.instant.at.resolution()) {
@@ -105,9 +172,30 @@ impl EventStage<'_, '_> {
             (produces(rule, &signs, atom) || switched::decides(&path, atom, 0.0, &signs))
                 .then_some((atom, apart))
         })?;
-        if apart > SURE {
-            self.detector.note_joined(rule.index, atom, self.instant.at);
-        }
-        Some(Change::new(atom, self.instant.at, [Sign::Zero, opposite(signs[atom])]))
+        Some((Change::new(atom, self.instant.at, [Sign::Zero, opposite(signs[atom])]), apart))
+    }
+
+    /// The same of a difference that jumps and was not taken apart into what moves: its sides do not come nearer each other before they do. What they
+    /// read must not move more, up to the jump, than it errs.
+    fn tie_of_jump(&self, id: ModuleId, other: f64) -> Option<(Change, f64)> {
+        let state = self.world.state(id).filter(|state| state.next.kind == NextKind::Event)?;
+        let rule = &self.setup.model.rules[state.rule.get()?];
+        let change = *state.next.touched().iter().find(|change| rule.jumping_whole[change.atom()])?;
+        let path =
+            Path::new(self.world, state, rule, self.instant.at, change.time.since(self.instant.at).max(0.0));
+        let error = path.error();
+        let factor = if error > 0.0 { 1.0 + other / error } else { 1.0 };
+        let (mut now, mut then, mut uncertain) = (Vec::new(), Vec::new(), Vec::new());
+        path.at(0.0, &mut now);
+        path.at(1.0, &mut then);
+        path.uncertain(1.0, &mut uncertain);
+        let apart = |&variable: &usize| {
+            let moved = (then[variable] - now[variable]).abs();
+            let noise = factor * 0.5 * (uncertain[variable].hi - uncertain[variable].lo);
+            if moved == 0.0 { 0.0 } else { moved / noise }
+        };
+        let apart = rule.atom_reads[change.atom()].iter().map(apart).fold(0.0, f64::max);
+        let signs = [change.at, change.after];
+        (apart <= 1.0).then(|| (Change::new(change.atom(), self.instant.at, signs), apart))
     }
 }
