@@ -109,6 +109,7 @@ mod tests {
             ("contour c=(1,0)(0,1) (-1, 0)", "contour c = (1, 0) (0, 1) (-1, 0)"),
             ("tropism 0,-1,0 strength 0.2", "tropism 0, -1, 0 strength 0.2"),
             ("axiom:  F (x)[+( 30)A]  -  ![ @L(-1) ]  ;(2 , 3)", "axiom: F(x)[+(30)A] - ![ @L(-1) ] ;(2, 3)"),
+            ("axiom: F&&_i( 1,0 ) &&A ||_a -&_b(2)  --_c", "axiom: F&&_i(1, 0) &&A ||_a -&_b(2) --_c"),
             ("A(x)<B( y )>C(z) :solve dy/dt=-x*z", "A(x) < B(y) > C(z): solve dy/dt = -x*z"),
             ("±( α ):solve dα / dt = 1", "±(α): solve dα/dt = 1"),
             (

@@ -137,7 +137,9 @@ impl<'t> Reader<'t, '_> {
         let rest = &self.text[first.start..];
         match first.token {
             Token::Symbol => {
-                let long = LONG.iter().find(|long| rest.starts_with(**long));
+                // In `F&&_i` the second symbol has a subscript.
+                let ends_at = |end: usize| self.lexemes[self.next..].iter().take(3).any(|l| l.end == end);
+                let long = LONG.iter().find(|l| rest.starts_with(**l) && ends_at(first.start + l.len()));
                 long.map_or(first.end, |long| first.start + long.len())
             }
             _ => first.end,
