@@ -36,6 +36,8 @@ pub(super) enum When {
     Behind,
     /// Not before then.
     Later(SimTime),
+    /// Never, by the numbers of now: it was found with others, or only touches.
+    Never,
 }
 
 /// The question whether a production holds, as a function of the signs of what jumps.
@@ -144,7 +146,7 @@ impl<'m> EventStage<'_, 'm> {
         for (place, change) in touched.iter_mut().enumerate().filter(|(place, _)| question.jumps[*place]) {
             (change.at, change.after) = (now[place], later[place]);
         }
-        When::Now
+        When::Never
     }
 
     /// When sides have met of which neighbours' values are a part, where a production leads to equations that end at an edge (`sqrt(x + y - 3.4)`): once
@@ -286,7 +288,12 @@ impl<'m> EventStage<'_, 'm> {
 }
 
 /// The signs of the differences of touched atoms, by the values of the rule's variables.
-fn signs(rule: &Rule, touched: &[Change], variables: &[f64], registers: &mut Vec<f64>) -> Vec<Sign> {
+pub(super) fn signs(
+    rule: &Rule,
+    touched: &[Change],
+    variables: &[f64],
+    registers: &mut Vec<f64>,
+) -> Vec<Sign> {
     let mut sides = vec![0.0; rule.sides.outputs()];
     rule.sides.eval(variables, registers, &mut sides);
     touched.iter().map(|change| Sign::of(sides[2 * change.atom()] - sides[2 * change.atom() + 1])).collect()

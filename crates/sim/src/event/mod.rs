@@ -96,6 +96,8 @@ pub struct Events {
     choices: usize,
     /// Parameters that meet levels at the instant, of modules that others look at: the module, the number of the parameter, the level.
     met: Vec<(ModuleId, usize, f64)>,
+    /// Modules that were opened for an event which does not take place by the numbers of now.
+    void: Vec<ModuleId>,
     /// Algebraic values of modules that were replaced at the instant, as they were followed.
     replaced_values: Vec<f64>,
     /// What jumps at the instant has jumped: a production has been applied that holds just after it only.

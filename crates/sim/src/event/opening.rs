@@ -25,6 +25,7 @@ impl EventStage<'_, '_> {
             NextEvent::Other(entry) => entry.owner == Owner::Derivation,
         });
         let ties = self.find_ties(batch);
+        self.events.void.clear();
         let mut oldest = None;
         // Whoever asks on which side of a jump it is asks the levels that others meet, not roundings of them.
         let turns: SmallVec<[u8; 8]> = match batch {
@@ -215,6 +216,9 @@ impl EventStage<'_, '_> {
             self.world.states.get_mut(slot).expect("scheduled").next.touch(kind, touched);
             self.schedule.schedule(Owner::Module(slot as u32), time);
             return Ok(None);
+        }
+        if let When::Never = when {
+            self.events.void.push(id);
         }
         self.flow().learn(id);
         self.touch_then(id, &touched, when);

@@ -1,14 +1,15 @@
 //! Ties: two modules of which one sees the other, whose events happen at one instant in truth but at two as integrated.
 
 use super::EventStage;
-use super::behind::When;
+use super::behind::{When, signs as signs_of};
 use crate::detect::doubt::FAR;
 use crate::detect::signs::{opposite, produces};
 use crate::detect::switched;
 use crate::flow::algebraic::is_algebraic;
 use crate::schedule::{NextEvent, Owner};
 use crate::world::path::Path;
-use crate::world::state::{Change, NextKind, Signs};
+use crate::world::state::{Change, NextKind, Signs, State};
+use dlsys_expr::{Dual, Interval};
 use dlsys_model::Sign;
 use dlsys_tree::ModuleId;
 use smallvec::SmallVec;
@@ -54,7 +55,10 @@ impl EventStage<'_, '_> {
             known += 1;
             let other = self.flows.error_of(self.world, with);
             for id in self.around(with) {
-                if let Some((change, apart)) = self.tie(id, other, visit) {
+                if self.world.state(id).is_none_or(|state| state.visited == visit) {
+                    continue;
+                }
+                if let Some((change, apart)) = self.tie(id, other).or_else(|| self.tie_of_jump(id, other)) {
                     ties.push(Tie { with, id, change, apart });
                     happening.push(id);
                     self.world.state_mut(id).expect("it has an event").visited = visit;
@@ -79,7 +83,8 @@ impl EventStage<'_, '_> {
     /// Opens the modules of ties, where the event that they are tied to takes place now.
     pub(super) fn join_ties(&mut self, ties: &[Tie]) {
         for tie in ties {
-            if !self.takes_place(tie.with) || self.takes_place(tie.id) {
+            let is_void = self.events.void.contains(&tie.with);
+            if is_void || !self.takes_place(tie.with) || self.takes_place(tie.id) {
                 continue;
             }
             let mut changes = [tie.change];
@@ -130,9 +135,9 @@ impl EventStage<'_, '_> {
     }
 
     /// The production of a module that is not later than now by more than the error, beside an event of a module whose
-    /// values have the error `other`, and how far its sides are apart, as a part of the error; None of those that `visit` has come by.
-    fn tie(&mut self, id: ModuleId, other: f64, visit: u32) -> Option<(Change, f64)> {
-        let state = self.world.state(id).filter(|state| state.visited != visit)?;
+    /// values have the error `other`, and how far its sides are apart, as a part of the error.
+    fn tie(&mut self, id: ModuleId, other: f64) -> Option<(Change, f64)> {
+        let state = self.world.state(id)?;
         let rule = &self.setup.model.rules[state.rule.get()?];
         if rule.produces.is_empty() || rule.atoms.is_empty() {
             return None;
@@ -150,18 +155,12 @@ impl EventStage<'_, '_> {
             0.0 if self.setup.is_algebraic => ROUNDING,
             error => error,
         };
-        if let Some(tie) = self.tie_of_jump(id, other) {
-            return Some(tie);
-        }
         let reach = self.flows.reach_of(self.world, id);
         let factor = if error > 0.0 { 1.0 + other / error } else { 0.0 };
         if known.since(self.instant.at) > FAR * factor * error * reach.max(self.instant.at.resolution()) {
             return None;
         }
-        let mut signs: Signs = state.marks.signs().into();
-        for change in state.next.changes().iter().filter(|change| change.time.since(self.instant.at) <= 0.0) {
-            signs[change.atom()] = change.after;
-        }
+        let signs = self.signs_now(state);
         let (atom, apart) = (0..rule.atoms.len()).find_map(|atom| {
             let may = error > 0.0
                 && matches!(signs[atom], Sign::Plus | Sign::Minus)
@@ -175,27 +174,50 @@ impl EventStage<'_, '_> {
         Some((Change::new(atom, self.instant.at, [Sign::Zero, opposite(signs[atom])]), apart))
     }
 
-    /// The same of a difference that jumps and was not taken apart into what moves: its sides do not come nearer each other before they do. What they
-    /// read must not move more, up to the jump, than it errs.
-    fn tie_of_jump(&self, id: ModuleId, other: f64) -> Option<(Change, f64)> {
-        let state = self.world.state(id).filter(|state| state.next.kind == NextKind::Event)?;
-        let rule = &self.setup.model.rules[state.rule.get()?];
-        let change = *state.next.touched().iter().find(|change| rule.jumping_whole[change.atom()])?;
-        let path =
-            Path::new(self.world, state, rule, self.instant.at, change.time.since(self.instant.at).max(0.0));
+    /// The same of a difference that jumps and was not taken apart into what moves: its sides do not come nearer each other before they do. But they have
+    /// jumped where all that they read has moved as far as it errs.
+    fn tie_of_jump(&mut self, id: ModuleId, other: f64) -> Option<(Change, f64)> {
+        let state = self.world.state(id)?;
+        let index = state.rule.get().filter(|rule| self.setup.has_jumps[*rule])?;
+        let rule = &self.setup.model.rules[index];
+        let signs = self.signs_now(state);
+        let may = |atom: &usize| rule.jumping_whole[*atom] && produces(rule, &signs, *atom);
+        let atoms: SmallVec<[usize; 4]> = (0..rule.atoms.len()).filter(may).collect();
+        if atoms.is_empty() {
+            return None;
+        }
+        let path = Path::new(self.world, state, rule, self.instant.at, 64.0 * self.instant.at.resolution());
         let error = path.error();
         let factor = if error > 0.0 { 1.0 + other / error } else { 1.0 };
-        let (mut now, mut then, mut uncertain) = (Vec::new(), Vec::new(), Vec::new());
-        path.at(0.0, &mut now);
-        path.at(1.0, &mut then);
-        path.uncertain(1.0, &mut uncertain);
-        let apart = |&variable: &usize| {
-            let moved = (then[variable] - now[variable]).abs();
-            let noise = factor * 0.5 * (uncertain[variable].hi - uncertain[variable].lo);
-            if moved == 0.0 { 0.0 } else { moved / noise }
-        };
-        let apart = rule.atom_reads[change.atom()].iter().map(apart).fold(0.0, f64::max);
-        let signs = [change.at, change.after];
-        (apart <= 1.0).then(|| (Change::new(change.atom(), self.instant.at, signs), apart))
+        let (mut moving, mut uncertain) = (Vec::new(), Vec::new());
+        path.departure(&mut moving);
+        path.uncertain(0.0, &mut uncertain);
+        let changes: Vec<Change> = (atoms.iter())
+            .map(|atom| Change::new(*atom, self.instant.at, [Sign::Zero, opposite(signs[*atom])]))
+            .collect();
+        [SURE, 1.0].into_iter().find_map(|part| {
+            let ahead = |(v, around): (&Dual<f64>, &Interval)| {
+                let noise = 0.5 * factor * (around.hi - around.lo);
+                if v.rate == 0.0 || noise.is_nan() {
+                    v.value
+                } else {
+                    v.value + part * noise * v.rate.signum()
+                }
+            };
+            let values: Vec<f64> = moving.iter().zip(&uncertain).map(ahead).collect();
+            let then = signs_of(rule, &changes, &values, &mut self.scratch.registers);
+            let jumped =
+                changes.iter().zip(then).find(|(change, then)| [Sign::Zero, change.after].contains(then));
+            jumped.map(|(change, at)| (Change::new(change.atom(), change.time, [at, change.after]), part))
+        })
+    }
+
+    /// The signs of a module as it is now, with those that have changed without consequence.
+    fn signs_now(&self, state: &State) -> Signs {
+        let mut signs: Signs = state.marks.signs().into();
+        for change in state.next.changes().iter().filter(|change| change.time.since(self.instant.at) <= 0.0) {
+            signs[change.atom()] = change.after;
+        }
+        signs
     }
 }
