@@ -122,6 +122,22 @@ fn a_cell_is_replaced_with_the_one_before() {
             first: "if x >= 0.51 produce C(x/2) C(x/2) solve dx/dt = 0.691*(3 - x)",
             cells: &[(1.737, 15)],
         },
+        Row {
+            axiom: "C(0.249) C(0.261) C(0.385) C(0.21)",
+            condition: "x >= 0.9 | 2*floor(a/0.9) + 1 > 2",
+            successor: "C(0.4*x) C(0.5*x)",
+            rate: "1.009*(a - x) + 1.009*(b - x) + 0.468",
+            first: "if x = 0.694 produce C(x/2) C(x/2) solve dx/dt = 0.798*(3 - x)",
+            cells: &[(2.137, 21)],
+        },
+        Row {
+            axiom: "C(0.233) C(0.373) C(0.445) C(0.211) C(0.33)",
+            condition: "x >= 0.874 | sign(a - 0.874) + sign(x - 0.874) > -1.5",
+            successor: "C(0.4*x) [ L(0.3*x) ]",
+            rate: "0.852*(a - x) + 0.852*(b - x) + 0.36",
+            first: "if x >= 0.72 produce C(x/2) C(x/2) solve dx/dt = 0.741*(3 - x)",
+            cells: &[(2.637, 18)],
+        },
     ];
     for row in &rows {
         let times: Vec<f64> = row.cells.iter().map(|(t, _)| *t).collect();

@@ -33,6 +33,7 @@ impl EventStage<'_, '_> {
             _ => batch.iter().map(|next| self.turn(next)).collect(),
         };
         let of = |turn: u8| batch.iter().zip(&turns).filter(move |(_, own)| **own == turn);
+        let mut put_off: SmallVec<[u32; 2]> = SmallVec::new();
         for (next, _) in (0..=LAST_TURN).flat_map(of) {
             let owner = match *next {
                 NextEvent::Lazy(_, slot) if all_lazy => {
@@ -59,10 +60,24 @@ impl EventStage<'_, '_> {
                         self.events.firing.push(firing);
                         Some(id)
                     }
-                    None => self.touch_scheduled(slot as usize)?,
+                    None => {
+                        let touched = self.touch_scheduled(slot as usize)?;
+                        if touched.is_none() {
+                            put_off.push(slot);
+                        }
+                        touched
+                    }
                 },
             };
             oldest = oldest.or(first);
+        }
+        // What the neighbours have met is known now, and no longer moves on.
+        for slot in put_off {
+            let around = self.around(self.world.tree.id(slot));
+            if around.iter().any(|beside| self.takes_place(*beside)) {
+                self.schedule.cancel(Owner::Module(slot));
+                oldest = self.touch_scheduled(slot as usize)?.or(oldest);
+            }
         }
         self.join_ties(&ties);
         Ok(oldest)
