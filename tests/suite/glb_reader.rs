@@ -125,7 +125,7 @@ impl Glb {
 
     /// What is shown at a time in seconds, by the name of the node; numbers of phases behind the lineage are left out.
     pub fn shown(&self, time: f64) -> BTreeMap<String, Shown> {
-        let mut shown: BTreeMap<String, Shown> = BTreeMap::new();
+        let mut shown: BTreeMap<String, (f64, Shown)> = BTreeMap::new();
         for (number, node) in self.nodes().iter().enumerate() {
             let scale = self.scale(number, time);
             if node["mesh"].is_null() || scale == 0.0 {
@@ -137,11 +137,13 @@ impl Glb {
             let turn = nalgebra::Quaternion::new(turn[3], turn[0], turn[1], turn[2]);
             let turn = nalgebra::UnitQuaternion::new_normalize(turn);
             let weights = self.value(number, "weights", time, &[]);
-            // While one phase gives way to the next, both are shown.
+            // While one phase gives way to the next, the one that is whole counts.
             let name = node["name"].as_str().expect("a name");
             let module: Vec<&str> = name.splitn(3, '.').take(2).collect();
-            let none = || Shown { vertices: Vec::new(), triangles: Vec::new() };
-            let all = shown.entry(module.join(".")).or_insert_with(none);
+            if shown.get(&module.join(".")).is_some_and(|(other, _)| *other > scale) {
+                continue;
+            }
+            let mut all = Shown { vertices: Vec::new(), triangles: Vec::new() };
             for primitive in mesh["primitives"].as_array().expect("primitives") {
                 let mut places = self.accessor(&primitive["attributes"]["POSITION"]);
                 let targets = primitive["targets"].as_array().map_or(&[][..], Vec::as_slice);
@@ -159,8 +161,9 @@ impl Glb {
                 all.triangles
                     .extend(corners.as_chunks().0.iter().map(|t| t.map(|i: f64| i as usize + first)));
             }
+            shown.insert(module.join("."), (scale, all));
         }
-        shown
+        shown.into_iter().map(|(name, (_, all))| (name, all)).collect()
     }
 }
 
