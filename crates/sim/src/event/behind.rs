@@ -217,11 +217,7 @@ impl<'m> EventStage<'_, 'm> {
     fn question(&self, id: ModuleId, rule: usize, touched: &[Change], jumps: Vec<bool>) -> Question<'m> {
         let model: &'m Model = self.setup.model;
         let state = self.world.state(id).expect("scheduled");
-        let mut before: Signs = state.marks.signs().into();
-        let passed = |change: &&Change| change.time.since(self.instant.at) <= 0.0;
-        for change in state.next.changes().iter().filter(passed) {
-            before[change.atom()] = change.after;
-        }
+        let before = self.signs_now(state);
         Question { rule: &model.rules[rule], before, touched: touched.to_vec(), jumps }
     }
 

@@ -213,7 +213,7 @@ impl EventStage<'_, '_> {
     }
 
     /// The signs of a module as it is now, with those that have changed without consequence.
-    fn signs_now(&self, state: &State) -> Signs {
+    pub(super) fn signs_now(&self, state: &State) -> Signs {
         let mut signs: Signs = state.marks.signs().into();
         for change in state.next.changes().iter().filter(|change| change.time.since(self.instant.at) <= 0.0) {
             signs[change.atom()] = change.after;
