@@ -5,9 +5,11 @@
 
 use std::collections::HashMap;
 
+use dlsys_geometry::scene::Vector;
+
 use crate::Error;
 use crate::blend::{Example, blend};
-use crate::part::{Form, Paint, Part, distance, triple};
+use crate::part::{Form, Paint, Part, distance, stem_point};
 use crate::stem::SIZES;
 use crate::thin::{place, thin};
 use crate::track::Phase;
@@ -255,9 +257,11 @@ fn stem(
     let sizes: Vec<[f64; SIZES]> = (0..ages.len())
         .map(|i| {
             let numbers = phase.numbers(i);
-            let radii = triple(numbers, 4);
-            let length = |end| (triple(numbers, end) - triple(numbers, 0)).norm();
-            [length(1), radii.x, radii.y, if neck { length(5) } else { 0.0 }, radii.z]
+            let [(start, lower), (end, upper)] = [0, 1].map(|which| stem_point(numbers, which));
+            let (narrow_end, narrow) =
+                if neck { stem_point(numbers, 2) } else { (start, [Vector::zeros(); 3]) };
+            let [lower, upper, narrow] = [lower, upper, narrow].map(|radii| radii[0].norm());
+            [(end - start).norm(), lower, upper, (narrow_end - start).norm(), narrow]
         })
         .collect();
     let size = sizes.iter().flatten().fold(0.0_f64, |a, b| a.max(*b));

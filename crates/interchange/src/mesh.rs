@@ -5,7 +5,7 @@ use std::sync::Arc;
 use dlsys_geometry::scene::{MaterialId, Mesh, Net, Palette, Patch, Point, Vector};
 use dlsys_render::{cross_section, normal, triangulate};
 
-use crate::part::{Catalogue, Form, Number, Paint, Part, any_across, triple};
+use crate::part::{Catalogue, Form, Number, Paint, Part, any_across, stem_point, stem_radii, triple};
 use crate::stem::{Corner, Tube};
 
 /// Corners of one material in their places.
@@ -62,8 +62,12 @@ impl Cutter<'_> {
             match *part {
                 Part::Stem(contour) | Part::Shoot(contour) => {
                     let neck = matches!(part, Part::Shoot(_));
-                    let tube = self
-                        .tube((contour, neck), own.iter().map(|n| triple(n, 2).norm()).fold(0.0, f64::max));
+                    let radius = |numbers: &&[N]| {
+                        stem_radii(numbers)
+                            .map(|first| triple(&numbers[first..], 0).norm())
+                            .fold(0.0, f64::max)
+                    };
+                    let tube = self.tube((contour, neck), own.iter().map(radius).fold(0.0, f64::max));
                     let (triangles, corners) = (tube.triangles.clone(), tube.corners.len());
                     layout.add(&mut counts, material, &triangles, corners, first, PieceShape::Stem(tube));
                 }
@@ -252,22 +256,26 @@ impl Layout {
 }
 
 fn stem<N: Number>(tube: &Tube, numbers: &[N], put: &mut impl FnMut(Vector, Vector)) {
-    let ends = [triple(numbers, 0), triple(numbers, 1)];
-    let along = triple(numbers, 2).try_normalize(1e-300).unwrap_or_else(Vector::y);
-    let across = triple(numbers, 3).try_normalize(1e-300).unwrap_or_else(|| any_across(&along));
+    let [(start, lower), (end, upper)] = [0, 1].map(|which| stem_point(numbers, which));
+    let has_neck = tube.sizes > 3;
+    let (narrow_end, narrow) = if has_neck { stem_point(numbers, 2) } else { (start, [Vector::zeros(); 3]) };
+    let neck = narrow_end - start;
+    let thick = if lower[2].norm_squared() >= upper[2].norm_squared() { lower } else { upper };
+    let unit = |v: Vector| v.try_normalize(1e-300);
+    let along = unit(thick[2]).or_else(|| unit(end - start)).unwrap_or_else(Vector::y);
+    let across = unit(thick[0]).unwrap_or_else(|| any_across(&along));
     let axes = [across, along.cross(&across), along];
-    let [lower, upper, narrow] = triple(numbers, 4).into();
-    let length = |end: Vector| (end - ends[0]).dot(&along);
-    let neck = if tube.sizes > 3 { length(triple(numbers, 5)) } else { 0.0 };
-    let sizes = [length(ends[1]), lower, upper, neck, narrow];
+    let slope = match neck.norm() {
+        0.0 => 0.0,
+        length => (lower[2].norm() - narrow[2].norm()) / length,
+    };
     for corner in &tube.corners {
-        let [height, radius] = corner.sized(&sizes);
-        // At the end itself, which may be beside the direction by rounding.
-        let middle = if corner.shares[0] > 0.0 { ends[1] } else { ends[0] + along * height };
-        let leaning =
-            if neck > 0.0 { along * (corner.slope * (lower - narrow) / neck) } else { Vector::zeros() };
-        let normal = (Corner::turned(corner.normal, axes) + leaning).normalize();
-        put(middle + Corner::turned(corner.place, axes) * radius, normal);
+        // Sums of the numbers, so that shapes between two others, and sums of several, are right.
+        let [to_end, of_lower, of_upper, to_neck, of_narrow] = corner.shares;
+        let middle = start + (end - start) * to_end + neck * to_neck;
+        let own = [0, 1, 2].map(|k| lower[k] * of_lower + upper[k] * of_upper + narrow[k] * of_narrow);
+        let normal = (Corner::turned(corner.normal, axes) + along * (corner.slope * slope)).normalize();
+        put(middle + Corner::turned(corner.place, own), normal);
     }
 }
 

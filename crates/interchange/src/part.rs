@@ -2,14 +2,14 @@
 //!
 //! | part | numbers |
 //! |---|---|
-//! | a straight stem | start, end, radius · direction, radius · across, (radius at the start, radius at the end, 0) |
-//! | one with a neck | the same, but for (radius at the start, radius at the end, radius at the end of the neck), end of the neck |
+//! | a straight stem | start, end; of each of them, its radius along three axes: across, at a right angle to that, along the stem |
+//! | one with a neck | the same, then the end of the neck and its radius along the axes |
 //! | a polygon | its corners |
 //! | a surface | origin, and the displacements along its three axes from there to the limits of its mesh |
 //! | a patch | 16 control points, row by row |
 //! | a net: a surface whose vertices move by themselves | its vertices |
 //!
-//! All numbers are points or displacements, three at a time, and the corners of meshes depend on them linearly (those of stems nearly). So a straight line
+//! All numbers are points or displacements, three at a time, and the corners of meshes depend on them linearly. So a straight line
 //! between the numbers of two instants is a straight line between all corners, and a bound of the difference of numbers is
 //! a bound of the distance of corners. Lengths are in metres.
 
@@ -18,6 +18,25 @@ use std::sync::Arc;
 
 use dlsys_geometry::scene::{MaterialId, Mesh, PatchSet, Point, Surface, Vector};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+
+/// Points of a stem, start, end and end of its neck, as triples of its numbers, each with the first of its radii.
+const STEM_POINTS: [[usize; 2]; 3] = [[0, 2], [1, 5], [8, 9]];
+
+/// Those of a stem that has these numbers.
+fn stem_points<N>(numbers: &[N]) -> impl Iterator<Item = [usize; 2]> {
+    STEM_POINTS.into_iter().filter(|[point, _]| 3 * point < numbers.len())
+}
+
+/// Where the radii of a stem begin among its numbers.
+pub(crate) fn stem_radii<N>(numbers: &[N]) -> impl Iterator<Item = usize> {
+    stem_points(numbers).map(|[_, axes]| 3 * axes)
+}
+
+/// The start of a stem (0), its end (1) or the end of its neck (2), and the radius there along three axes: across, at a right angle to that, along.
+pub(crate) fn stem_point<N: Number>(numbers: &[N], which: usize) -> (Vector, [Vector; 3]) {
+    let [point, axes] = STEM_POINTS[which];
+    (triple(numbers, point), [0, 1, 2].map(|axis| triple(numbers, axes + axis)))
+}
 
 /// What is drawn, without its numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -40,8 +59,8 @@ impl Part {
     /// How many numbers it has.
     pub(crate) fn numbers(self) -> usize {
         match self {
-            Part::Stem(_) => 15,
-            Part::Shoot(_) => 18,
+            Part::Stem(_) => 24,
+            Part::Shoot(_) => 36,
             Part::Polygon(corners) => 3 * corners as usize,
             Part::Surface(_) => 12,
             Part::Patch => 48,
@@ -55,6 +74,16 @@ impl Part {
         match self {
             // A corner of the mesh is the origin and at most one of each displacement.
             Part::Surface(_) => norms.sum(),
+            // One of a stem is a mean of its points, and of its radii.
+            Part::Stem(_) | Part::Shoot(_) => {
+                let square = |i: usize| triple(differences, i).norm_squared();
+                let [mut middle, mut radius] = [0.0_f64; 2];
+                for [point, axes] in stem_points(differences) {
+                    middle = middle.max(square(point));
+                    radius = radius.max((axes..axes + 3).map(square).sum());
+                }
+                middle.sqrt() + radius.sqrt()
+            }
             _ => norms.fold(0.0, f64::max),
         }
     }
@@ -63,7 +92,9 @@ impl Part {
     fn reach(self, numbers: &[f32]) -> f64 {
         let norm = |i: usize| triple(numbers, i).norm();
         match self {
-            Part::Stem(_) | Part::Shoot(_) => norm(0).max(norm(1)) + norm(2),
+            Part::Stem(_) | Part::Shoot(_) => {
+                stem_points(numbers).map(|[point, axes]| norm(point) + norm(axes)).fold(0.0, f64::max)
+            }
             Part::Surface(_) => (0..4).map(norm).sum(),
             Part::Polygon(_) | Part::Patch | Part::Net(..) => {
                 (0..numbers.len() / 3).map(norm).fold(0.0, f64::max)

@@ -180,23 +180,21 @@ impl Sampler {
                 let radii = segment.widths.map(|w| w.resolve(self.default_width) / 2.0 * metres);
                 let neck = necks.get(i).copied().flatten();
                 let start = neck.map_or(radii[0], |neck| neck.radius * metres);
-                let radius = start.max(radii[1]);
+                let [along, across] = [segment.direction, segment.across].map(|axis| frame.local(axis));
+                let axes = [across, along.cross(&across), along];
                 put(point(segment.start));
                 put(point(segment.end));
-                put(frame.local(segment.direction) * radius);
-                put(frame.local(segment.across) * radius);
+                axes.iter().for_each(|axis| put(axis * start));
+                axes.iter().for_each(|axis| put(axis * radii[1]));
                 let part = match neck {
                     Some(neck) => {
                         let length = (segment.end - segment.start).norm();
                         let part = if length > 0.0 { neck.length / length } else { 0.0 };
-                        put(Vector::new(start, radii[1], radii[0] + (radii[1] - radii[0]) * part));
                         put(point(segment.start + segment.direction * neck.length));
+                        axes.iter().for_each(|axis| put(axis * (radii[0] + (radii[1] - radii[0]) * part)));
                         Part::Shoot(segment.contour)
                     }
-                    None => {
-                        put(Vector::new(start, radii[1], 0.0));
-                        Part::Stem(segment.contour)
-                    }
+                    None => Part::Stem(segment.contour),
                 };
                 (part, Some(segment.material))
             }

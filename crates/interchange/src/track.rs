@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use dlsys_geometry::scene::Vector;
 use dlsys_tree::Lineage;
 
-use crate::part::{Catalogue, Form, Frame, Paint, Part, distance, reach, triple};
+use crate::part::{Catalogue, Form, Frame, Paint, Part, distance, reach, stem_radii, triple};
 use crate::sample::Sample;
 use crate::thin::{thin, weight};
 
@@ -87,16 +88,29 @@ impl Phase {
         let mut first = 0;
         for part in self.form.iter() {
             if let Part::Stem(_) | Part::Shoot(_) = part {
-                let mut grown: Option<([f32; 6], f32)> = None;
+                let mut grown: Option<[Vector; 3]> = None;
                 for i in (0..self.times.len()).rev() {
                     let own = &mut self.numbers[i * width + first..][..part.numbers()];
-                    let radius = own[12].max(own[13]).max(own[14]);
+                    // Three axes at each of its points.
+                    let axes: Vec<usize> = stem_radii(own).collect();
+                    let radius = |own: &[f32], first: usize| triple(&own[first..], 0).norm();
+                    let thickest = axes.iter().map(|first| radius(own, *first)).fold(0.0, f64::max);
                     let length = (triple(own, 1) - triple(own, 0)).norm();
                     match grown {
-                        Some((axes, of)) if length <= LONGEST * f64::from(radius) && of > 0.0 => {
-                            own[6..12].iter_mut().zip(axes).for_each(|(own, x)| *own = x / of * radius);
+                        Some(units) if length <= LONGEST * thickest => {
+                            for first in axes {
+                                let radius = radius(own, first);
+                                let all = units.iter().flatten().map(|x| (x * radius) as f32);
+                                own[first..].iter_mut().zip(all).for_each(|(own, x)| *own = x);
+                            }
                         }
-                        _ => grown = own[6..12].try_into().ok().map(|axes| (axes, radius)),
+                        _ => {
+                            let thick = axes.into_iter().find(|first| radius(own, *first) > 0.0);
+                            let units = |first: usize| {
+                                [0, 1, 2].map(|axis| triple(&own[first..], axis) / radius(own, first))
+                            };
+                            grown = thick.map(units).or(grown);
+                        }
                     }
                 }
             }
