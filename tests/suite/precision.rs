@@ -499,23 +499,25 @@ fn cells_with_one_equilibrium_keep_their_order() {
 /// is below zero never takes place, and nothing is in doubt.
 #[test]
 fn empty_cells_are_not_below_zero() {
-    let row = |(rate, right): (&str, f64), value: &str, guard: &str| {
+    let row = |(rate, [left, right]): (&str, [f64; 2]), value: &str, guard: &str| {
         let cells = "F_v(0, 0) ".repeat(10);
         format!(
-            "initial string: F_w(1.446, 0) {cells} F_w({right}, 0)\nF(l, p) < F_v(c, v) > F(r, q):\n solve dc/dt = {rate}, v = {value}\n {guard}"
+            "initial string: F_w({left}, 0) {cells} F_w({right}, 0)\nF(l, p) < F_v(c, v) > F(r, q):\n solve dc/dt = {rate}, v = {value}\n {guard}"
         )
     };
     let rates = [
-        ("0.702*(l + r - 2*c) + 1.332*c + 1.86*abs(r - c) - 0.897*c", 0.556),
-        ("0.128*c + 1.646*l/(1 + c*c) - 1.229*c", 0.556),
-        ("1.336*max(l - c, 0) + 0.331*abs(r - c) - 0.504*c", 0.556),
+        ("0.702*(l + r - 2*c) + 1.332*c + 1.86*abs(r - c) - 0.897*c", [1.446, 0.556]),
+        ("0.128*c + 1.646*l/(1 + c*c) - 1.229*c", [1.446, 0.556]),
+        ("1.336*max(l - c, 0) + 0.331*abs(r - c) - 0.504*c", [1.446, 0.556]),
         // The last cell leaves zero unseen, and goes back towards it for a while when its neighbour is found to leave.
-        ("1.143*abs(r - c) + 1.062*(l + r - 2*c) - 0.549*c", 0.0),
+        ("1.143*abs(r - c) + 1.062*(l + r - 2*c) - 0.549*c", [1.446, 0.0]),
+        ("0.643*(l + r - 2*c) + 0.672*abs(l - r) - 0.897*c", [0.0, 1.613]),
     ];
     let guards = [
         ("0", "if c < 0 produce F_v(0.4, 0)"),
         ("0", "if c + r < 0 produce ε"),
         ("0", "if min(c, r) < 0 produce ε"),
+        ("0", "if max(-c, -r) > 0 produce ε"),
         ("floor(3.612*c)", "if v < 0 produce F_v(0.4, 0)"),
         ("if c < 0 then 1 else 0", "if v > 0.5 produce ε"),
     ];

@@ -3,7 +3,7 @@
 //! `floor(x) = 2` changes where x passes 2 and 3, but the difference of its sides rests at whole numbers and jumps from one to the
 //! next: whether it has just jumped cannot be told from its value near the jump, where x may be rounded to either side. `2 <= x & x < 3`
 //! says the same, and changes where differences of smooth values cross zero. The same holds for `sign`, and for comparisons of
-//! `max(x, y)`, `min(x, y)` and `abs(x)` with an operand, which rest at equality; and for the place within a period, `x - floor(x) < 0.3`: it is so where
+//! `max(x, y)`, `min(x, y)` and `abs(x)`, which have kinks and rest where they are compared with an operand; and for the place within a period, `x - floor(x) < 0.3`: it is so where
 //! sin(π x) sin(π (x - 0.3)) is negative, and where x is whole.
 
 use dlsys_expr::{Binary, Graph, Node, NodeId, Unary};
@@ -44,6 +44,77 @@ pub fn plain(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<NodeId>
         }
         _ => None,
     }
+}
+
+/// A comparison of `min(x, y)`, `max(x, y)` or `abs(x)` with anything, as comparisons of x and y; None if it is of nothing like that, or jumps. The smaller of two
+/// values has a kink where they are equal, and what is said of one of them, such as that it still rests at 0, is lost. Comparisons with NaN keep their results.
+pub fn apart(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<NodeId> {
+    let Node::Binary(op, a, b) = graph.node(id) else { return None };
+    if has_steps(graph, &[a, b], moves) {
+        return None;
+    }
+    match op {
+        Binary::Eq => one_is(graph, a, b).or_else(|| one_is(graph, b, a)),
+        Binary::Ne => {
+            let equal = one_is(graph, a, b).or_else(|| one_is(graph, b, a))?;
+            Some(graph.unary(Unary::Not, equal))
+        }
+        Binary::Lt | Binary::Le => {
+            let is_strict = op == Binary::Lt;
+            each_below(graph, a, b, is_strict).or_else(|| each_above(graph, a, b, is_strict))
+        }
+        _ => None,
+    }
+}
+
+/// The operands of a minimum, a maximum or an absolute value, which is the larger of x and -x; and whether it is the smaller of them.
+fn operands(graph: &mut Graph, id: NodeId) -> Option<(bool, [NodeId; 2])> {
+    match graph.node(id) {
+        Node::Binary(op @ (Binary::Min | Binary::Max), x, y) => Some((op == Binary::Min, [x, y])),
+        Node::Unary(Unary::Abs, x) => Some((false, [x, graph.unary(Unary::Neg, x)])),
+        _ => None,
+    }
+}
+
+/// `min(x, y) = level`, or `max(x, y) = level`: one is, and the other one is not beyond it.
+fn one_is(graph: &mut Graph, step: NodeId, level: NodeId) -> Option<NodeId> {
+    let (is_least, [x, y]) = operands(graph, step)?;
+    let mut one = |x, y| {
+        let (lo, hi) = if is_least { (level, y) } else { (y, level) };
+        let (is_so, other) = (graph.binary(Binary::Eq, x, level), ordered(graph, false, lo, hi));
+        graph.binary(Binary::And, is_so, other)
+    };
+    let each = [one(x, y), one(y, x)];
+    Some(graph.binary(Binary::Or, each[0], each[1]))
+}
+
+/// `min(x, y) < level`, `max(x, y) < level`, or with `<=`.
+fn each_below(graph: &mut Graph, step: NodeId, level: NodeId, is_strict: bool) -> Option<NodeId> {
+    let (is_least, operands) = operands(graph, step)?;
+    let pairs = operands.map(|x| [x, level]);
+    Some(both_or_either(graph, !is_least, pairs, is_strict))
+}
+
+/// `level < min(x, y)`, `level < max(x, y)`, or with `<=`.
+fn each_above(graph: &mut Graph, level: NodeId, step: NodeId, is_strict: bool) -> Option<NodeId> {
+    let (is_least, operands) = operands(graph, step)?;
+    let pairs = operands.map(|x| [level, x]);
+    Some(both_or_either(graph, is_least, pairs, is_strict))
+}
+
+/// Both pairs are in order, or one of them is and the other one has numbers.
+fn both_or_either(graph: &mut Graph, both: bool, pairs: [[NodeId; 2]; 2], is_strict: bool) -> NodeId {
+    let [first, second] = pairs.map(|[a, b]| ordered(graph, is_strict, a, b));
+    if both {
+        return graph.binary(Binary::And, first, second);
+    }
+    let [not_first, not_second] = pairs.map(|[a, b]| ordered(graph, !is_strict, b, a));
+    let mut one = |is_so, other, not_other| {
+        let any = graph.binary(Binary::Or, other, not_other);
+        graph.binary(Binary::And, is_so, any)
+    };
+    let each = [one(first, second, not_second), one(second, first, not_first)];
+    graph.binary(Binary::Or, each[0], each[1])
 }
 
 /// `step + n` and a level, both whole numbers, as the step and the level less n.
@@ -257,12 +328,50 @@ fn above(
 
 #[cfg(test)]
 mod tests {
-    use super::{Moves, plain};
+    use super::{Moves, apart, plain};
     use dlsys_expr::{Binary, Graph, NodeId, Program, Unary};
 
     /// The value of an expression of x and y.
     fn value(graph: &Graph, root: NodeId, variables: [f64; 2]) -> f64 {
         Program::compile(graph, &[root], 2).eval_one(&variables)
+    }
+
+    #[test]
+    fn comparisons_taken_apart_hold_for_the_same_values() {
+        let numbers =
+            [-2.5, -1.0, -0.5, -0.0, 0.0, 0.5, 1.0, 2.5, f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
+        let mut graph = Graph::default();
+        let (x, y) = (graph.var(0), graph.var(1));
+        let one = graph.constant(1.0);
+        let double = graph.binary(Binary::Add, y, y);
+        let mut kinks = vec![graph.unary(Unary::Abs, x)];
+        for op in [Binary::Min, Binary::Max] {
+            kinks.extend([graph.binary(op, x, y), graph.binary(op, one, x)]);
+        }
+        let mut levels: Vec<NodeId> = numbers.map(|number| graph.constant(number)).into();
+        levels.extend([double, kinks[1], kinks[4]]);
+        let mut known = 0;
+        for &kink in &kinks {
+            for &level in &levels {
+                for op in [Binary::Lt, Binary::Le, Binary::Eq, Binary::Ne] {
+                    for (a, b) in [(kink, level), (level, kink)] {
+                        let written = graph.binary(op, a, b);
+                        let Some(made) = apart(&mut graph, written, &Moves { steady: &[1], jumping: &[] })
+                        else {
+                            continue;
+                        };
+                        known += 1;
+                        for &x in &numbers {
+                            for &y in &numbers {
+                                let [before, after] = [written, made].map(|root| value(&graph, root, [x, y]));
+                                assert_eq!(before, after, "{op:?} {kink:?} {level:?}: {x}, {y}");
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        assert!(known > 250, "{known}");
     }
 
     #[test]

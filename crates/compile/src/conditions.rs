@@ -88,6 +88,11 @@ impl RuleBuilder<'_> {
                         tasks.push(Task::Visit(plain, jumps));
                         continue;
                     }
+                    if let Some(apart) = comparisons::apart(&mut self.scope.graph, id, &moves) {
+                        self.note_parts(id, apart, span);
+                        tasks.push(Task::Visit(apart, jumps));
+                        continue;
+                    }
                     // What is left of it may jump itself.
                     let has_steps = (jumps || atoms.of_productions)
                         && comparisons::has_steps(&self.scope.graph, &[a, b], &moves);
@@ -127,14 +132,20 @@ impl RuleBuilder<'_> {
         all.filter(|(_, gathered)| jumps(gathered.term)).map(|(variable, _)| variable).collect()
     }
 
-    /// A comparison in terms of what moves, if there is one; where it is written, and as what, holds for all of its parts.
+    /// A comparison in terms of what moves, if there is one.
     fn plain(&mut self, id: NodeId, span: Span, moves: &Moves<'_>) -> Option<NodeId> {
         let plain = comparisons::plain(&mut self.scope.graph, id, moves)?;
+        self.note_parts(id, plain, span);
+        Some(plain)
+    }
+
+    /// Where a comparison is written, and as what, holds for all parts of what takes its place.
+    fn note_parts(&mut self, id: NodeId, parts: NodeId, span: Span) {
         let (at, written) = match self.scope.comparisons.get(&id) {
             Some((at, sides)) => (*at, Some(sides.written.clone())),
             None => (span, None),
         };
-        for part in self.scope.graph.reachable(&[plain]) {
+        for part in self.scope.graph.reachable(&[parts]) {
             if let Node::Binary(Binary::Lt | Binary::Le | Binary::Eq, ..) = self.scope.graph.node(part)
                 && let Some(written) = &written
             {
@@ -142,7 +153,6 @@ impl RuleBuilder<'_> {
                 self.scope.comparisons.entry(part).or_insert_with(sides);
             }
         }
-        Some(plain)
     }
 }
 
