@@ -545,6 +545,52 @@ fn empty_cells_are_not_below_zero() {
     }
 }
 
+/// Conditions on minima, maxima and choices are those on what they are of, also where both sides have a part in common and rest at equality.
+#[test]
+fn comparisons_of_kinks_and_choices_are_those_of_their_parts() {
+    let alone = |law: &str, guard: &str| {
+        format!(
+            "initial string: F(0.461, 0.495, 0) F(0.279, -0.169, 0)\nF(x, y, n):\n solve {law}\n if ({guard}) & n < 6 produce F(-0.202, 0.08, n + 1)"
+        )
+    };
+    let turning = "dx/dt = 1.573*cos(2.015*age) + 0.36, dy/dt = 0.299 + 0.438*cos(0.688*age)";
+    let rising = "dx/dt = 1.705*sin(1.456*t + 1.457) + 1.305*cos(1.226*age), dy/dt = 0.825 + 0.207*sin(0.986*t + 0.69)";
+    let row = |guard: &str| {
+        format!(
+            "initial string: F_w(0.332, 0, 0) F_v(0.114, 0.155, 0) F_v(0.042, 0.451, 0) F_v(-0.06, -0.025, 0) F_v(0.238, 0.462, 0) F_w(0.192, 0, 0)\n\
+             F(l, a, b) < F_v(x, y, n) > F(r, c, d):\n solve dx/dt = 0.3*(l + r - 2*x) + 1.341*sin(1.306*t + 0.647) + 0.794*x + 0.892*y, dy/dt = -1.369*x - 0.358*y\n \
+             if ({guard}) & n < 6 produce F_v(0.385, 0.247, n + 1)"
+        )
+    };
+    let alike = [
+        [
+            alone(turning, "min(x + n, y) < max(y, -0.681)"),
+            alone(turning, "x + n < y | x + n < -0.681 | y < -0.681"),
+        ],
+        [
+            alone(rising, "(if x >= -0.226 then x else 2*x - y) = max(y, 0.781)"),
+            alone(rising, "(x >= y & x = 0.781) | (x = y & y >= 0.781)"),
+        ],
+        [row("max(x, y) > max(y, -0.585)"), row("x > y & x > -0.585")],
+    ];
+    for [written, by_hand] in alike {
+        for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau] {
+            for tolerance in [1e-5, 1e-7, 1e-9] {
+                let settings = Settings { method, tolerance, ..Settings::default() };
+                let states = |text: &str| {
+                    run(text, settings, &[1.7, 4.3]).unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"))
+                };
+                for (a, b) in
+                    states(&written).into_iter().flatten().zip(states(&by_hand).into_iter().flatten())
+                {
+                    let near = a.1.iter().zip(&b.1).all(|(a, b)| (a - b).abs() < 100.0 * tolerance);
+                    assert!(a.0 == b.0 && near, "{method:?} {tolerance:e}: {a:?} {b:?}\n{written}");
+                }
+            }
+        }
+    }
+}
+
 /// The error of a polynomial that is written out is not that of its terms.
 #[test]
 fn a_narrow_window_may_be_written_out() {

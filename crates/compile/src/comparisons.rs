@@ -46,75 +46,128 @@ pub fn plain(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<NodeId>
     }
 }
 
-/// A comparison of `min(x, y)`, `max(x, y)` or `abs(x)` with anything, as comparisons of x and y; None if it is of nothing like that, or jumps. The smaller of two
-/// values has a kink where they are equal, and what is said of one of them, such as that it still rests at 0, is lost. Comparisons with NaN keep their results.
-pub fn apart(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<NodeId> {
+/// A comparison of `min(x, y)`, `max(x, y)`, `abs(x)` or `if p then x else y` with anything, as comparisons of x and y, and whether it jumps; None if it is of
+/// nothing like that. The smaller of two values has a kink where they are equal, and what is said of one of them, such as that it still rests at 0, is lost.
+/// Comparisons with NaN keep their results.
+pub fn apart(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<(NodeId, bool)> {
+    if let Some(parts) = of_branches(graph, id, moves) {
+        return Some(parts);
+    }
     let Node::Binary(op, a, b) = graph.node(id) else { return None };
     if has_steps(graph, &[a, b], moves) {
         return None;
     }
-    match op {
-        Binary::Eq => one_is(graph, a, b).or_else(|| one_is(graph, b, a)),
+    let parts = match op {
+        Binary::Eq => one_is(graph, a, b).or_else(|| one_is(graph, b, a))?,
         Binary::Ne => {
             let equal = one_is(graph, a, b).or_else(|| one_is(graph, b, a))?;
-            Some(graph.unary(Unary::Not, equal))
+            graph.unary(Unary::Not, equal)
         }
         Binary::Lt | Binary::Le => {
             let is_strict = op == Binary::Lt;
-            each_below(graph, a, b, is_strict).or_else(|| each_above(graph, a, b, is_strict))
+            each_below(graph, a, b, is_strict).or_else(|| each_above(graph, a, b, is_strict))?
         }
-        _ => None,
-    }
-}
-
-/// The operands of a minimum, a maximum or an absolute value, which is the larger of x and -x; and whether it is the smaller of them.
-fn operands(graph: &mut Graph, id: NodeId) -> Option<(bool, [NodeId; 2])> {
-    match graph.node(id) {
-        Node::Binary(op @ (Binary::Min | Binary::Max), x, y) => Some((op == Binary::Min, [x, y])),
-        Node::Unary(Unary::Abs, x) => Some((false, [x, graph.unary(Unary::Neg, x)])),
-        _ => None,
-    }
-}
-
-/// `min(x, y) = level`, or `max(x, y) = level`: one is, and the other one is not beyond it.
-fn one_is(graph: &mut Graph, step: NodeId, level: NodeId) -> Option<NodeId> {
-    let (is_least, [x, y]) = operands(graph, step)?;
-    let mut one = |x, y| {
-        let (lo, hi) = if is_least { (level, y) } else { (y, level) };
-        let (is_so, other) = (graph.binary(Binary::Eq, x, level), ordered(graph, false, lo, hi));
-        graph.binary(Binary::And, is_so, other)
+        _ => return None,
     };
-    let each = [one(x, y), one(y, x)];
-    Some(graph.binary(Binary::Or, each[0], each[1]))
+    Some((parts, false))
+}
+
+/// `(if p then x else y) < level` as `p & x < level | !p & y < level`; the same of other comparisons. What rests in a branch makes a jump of the choice, as a
+/// whole part is one; between two that move it is the condition that counts.
+fn of_branches(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<(NodeId, bool)> {
+    let Node::Binary(op, a, b) = graph.node(id) else { return None };
+    let is_left = matches!(graph.node(a), Node::Select(..));
+    let Node::Select(condition, yes, no) = graph.node(if is_left { a } else { b }) else { return None };
+    let rests = |branch| graph.variables(&[branch]).into_iter().all(|v| moves.is_steady(v));
+    let jumps = (rests(yes) || rests(no)) && has_steps(graph, &[id], moves);
+    // The one that is not chosen may have no value.
+    if !graph.reachable(&[yes, no]).into_iter().all(|id| has_value(graph.node(id))) {
+        return None;
+    }
+    let not = graph.unary(Unary::Not, condition);
+    let each = [(condition, yes), (not, no)].map(|(holds, branch)| {
+        let (a, b) = if is_left { (branch, b) } else { (a, branch) };
+        let compared = graph.binary(op, a, b);
+        graph.binary(Binary::And, holds, compared)
+    });
+    Some((graph.binary(Binary::Or, each[0], each[1]), jumps))
+}
+
+/// True for operations that have a value for all finite operands, but for overflow.
+fn has_value(node: Node) -> bool {
+    use Binary::{Add, And, Eq, Le, Lt, Max, Min, Mul, Ne, Or, Sub};
+    match node {
+        Node::Const(_) | Node::Var(_) | Node::Select(..) => true,
+        Node::Unary(op, _) => matches!(
+            op,
+            Unary::Neg | Unary::Square | Unary::Not | Unary::Abs | Unary::Sign | Unary::Floor | Unary::Ceil
+        ),
+        Node::Binary(op, ..) => matches!(op, Add | Sub | Mul | Min | Max | Lt | Le | Eq | Ne | And | Or),
+        _ => false,
+    }
+}
+
+/// What minima of minima, maxima of maxima, or an absolute value, which is the larger of x and -x, are of; and whether it is the smallest.
+fn operands(graph: &mut Graph, id: NodeId) -> Option<(bool, Vec<NodeId>)> {
+    let op = match graph.node(id) {
+        Node::Binary(op @ (Binary::Min | Binary::Max), ..) => op,
+        Node::Unary(Unary::Abs, x) => return Some((false, vec![x, graph.unary(Unary::Neg, x)])),
+        _ => return None,
+    };
+    let (mut found, mut rest) = (Vec::new(), vec![id]);
+    while let Some(id) = rest.pop() {
+        match graph.node(id) {
+            Node::Binary(other, x, y) if other == op => rest.extend([y, x]),
+            _ => found.push(id),
+        }
+    }
+    Some((op == Binary::Min, found))
+}
+
+fn joined(graph: &mut Graph, op: Binary, all: impl IntoIterator<Item = NodeId>) -> Option<NodeId> {
+    all.into_iter().reduce(|all, next| graph.binary(op, all, next))
+}
+
+/// `min(x, y) = level`, or `max(x, y) = level`: one is, and none is beyond it.
+fn one_is(graph: &mut Graph, step: NodeId, level: NodeId) -> Option<NodeId> {
+    let (is_least, operands) = operands(graph, step)?;
+    let is_level: Vec<NodeId> = operands.iter().map(|x| graph.binary(Binary::Eq, *x, level)).collect();
+    let is_within = operands.iter().map(|x| {
+        let (lo, hi) = if is_least { (level, *x) } else { (*x, level) };
+        ordered(graph, false, lo, hi)
+    });
+    let is_within: Vec<NodeId> = is_within.collect();
+    let one = joined(graph, Binary::Or, is_level)?;
+    joined(graph, Binary::And, [one].into_iter().chain(is_within))
 }
 
 /// `min(x, y) < level`, `max(x, y) < level`, or with `<=`.
 fn each_below(graph: &mut Graph, step: NodeId, level: NodeId, is_strict: bool) -> Option<NodeId> {
     let (is_least, operands) = operands(graph, step)?;
-    let pairs = operands.map(|x| [x, level]);
-    Some(both_or_either(graph, !is_least, pairs, is_strict))
+    let pairs: Vec<_> = operands.into_iter().map(|x| [x, level]).collect();
+    all_or_one(graph, !is_least, &pairs, is_strict)
 }
 
 /// `level < min(x, y)`, `level < max(x, y)`, or with `<=`.
 fn each_above(graph: &mut Graph, level: NodeId, step: NodeId, is_strict: bool) -> Option<NodeId> {
     let (is_least, operands) = operands(graph, step)?;
-    let pairs = operands.map(|x| [level, x]);
-    Some(both_or_either(graph, is_least, pairs, is_strict))
+    let pairs: Vec<_> = operands.into_iter().map(|x| [level, x]).collect();
+    all_or_one(graph, is_least, &pairs, is_strict)
 }
 
-/// Both pairs are in order, or one of them is and the other one has numbers.
-fn both_or_either(graph: &mut Graph, both: bool, pairs: [[NodeId; 2]; 2], is_strict: bool) -> NodeId {
-    let [first, second] = pairs.map(|[a, b]| ordered(graph, is_strict, a, b));
-    if both {
-        return graph.binary(Binary::And, first, second);
+/// All pairs are in order; or one of them is, and all have numbers.
+fn all_or_one(graph: &mut Graph, all: bool, pairs: &[[NodeId; 2]], is_strict: bool) -> Option<NodeId> {
+    let are: Vec<NodeId> = pairs.iter().map(|[a, b]| ordered(graph, is_strict, *a, *b)).collect();
+    if all {
+        return joined(graph, Binary::And, are);
     }
-    let [not_first, not_second] = pairs.map(|[a, b]| ordered(graph, !is_strict, b, a));
-    let mut one = |is_so, other, not_other| {
-        let any = graph.binary(Binary::Or, other, not_other);
-        graph.binary(Binary::And, is_so, any)
-    };
-    let each = [one(first, second, not_second), one(second, first, not_first)];
-    graph.binary(Binary::Or, each[0], each[1])
+    let one = joined(graph, Binary::Or, are.iter().copied())?;
+    let have_numbers = are.iter().zip(pairs).map(|(is_so, [a, b])| {
+        let is_not = ordered(graph, !is_strict, *b, *a);
+        graph.binary(Binary::Or, *is_so, is_not)
+    });
+    let have_numbers: Vec<NodeId> = have_numbers.collect();
+    joined(graph, Binary::And, [one].into_iter().chain(have_numbers))
 }
 
 /// `step + n` and a level, both whole numbers, as the step and the level less n.
@@ -348,6 +401,9 @@ mod tests {
         for op in [Binary::Min, Binary::Max] {
             kinks.extend([graph.binary(op, x, y), graph.binary(op, one, x)]);
         }
+        kinks.push(graph.binary(Binary::Min, kinks[1], double));
+        let is_less = graph.binary(Binary::Lt, x, y);
+        kinks.push(graph.select(is_less, double, x));
         let mut levels: Vec<NodeId> = numbers.map(|number| graph.constant(number)).into();
         levels.extend([double, kinks[1], kinks[4]]);
         let mut known = 0;
@@ -356,7 +412,8 @@ mod tests {
                 for op in [Binary::Lt, Binary::Le, Binary::Eq, Binary::Ne] {
                     for (a, b) in [(kink, level), (level, kink)] {
                         let written = graph.binary(op, a, b);
-                        let Some(made) = apart(&mut graph, written, &Moves { steady: &[1], jumping: &[] })
+                        let Some((made, _)) =
+                            apart(&mut graph, written, &Moves { steady: &[1], jumping: &[] })
                         else {
                             continue;
                         };

@@ -14,6 +14,9 @@ use dlsys_model::{Boundary, Comparison, Condition, ConditionStep};
 /// Maximum number of comparisons and connectives of a condition, after expansion of functions.
 const MAX_CONDITION: usize = 10_000;
 
+/// Comparisons of a condition that are taken apart at kinks and choices, at most.
+const MAX_APART: usize = 100;
+
 /// The sides of a comparison as written.
 pub struct Sides {
     pub written: [String; 2],
@@ -54,7 +57,7 @@ impl RuleBuilder<'_> {
             Emit(ConditionStep),
         }
         let jumping = self.jumping_aggregates(atoms);
-        let mut steps = Vec::new();
+        let (mut steps, mut taken_apart) = (Vec::new(), 0);
         let mut tasks = vec![Task::Visit(root, false)];
         while let Some(task) = tasks.pop() {
             if steps.len() > MAX_CONDITION {
@@ -88,9 +91,13 @@ impl RuleBuilder<'_> {
                         tasks.push(Task::Visit(plain, jumps));
                         continue;
                     }
-                    if let Some(apart) = comparisons::apart(&mut self.scope.graph, id, &moves) {
-                        self.note_parts(id, apart, span);
-                        tasks.push(Task::Visit(apart, jumps));
+                    // Choices of choices may be endless.
+                    if taken_apart < MAX_APART
+                        && let Some((parts, jump)) = comparisons::apart(&mut self.scope.graph, id, &moves)
+                    {
+                        taken_apart += 1;
+                        self.note_parts(id, parts, span);
+                        tasks.push(Task::Visit(parts, jumps || jump));
                         continue;
                     }
                     // What is left of it may jump itself.
