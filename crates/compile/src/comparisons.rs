@@ -46,10 +46,10 @@ pub fn plain(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<NodeId>
     }
 }
 
-/// A comparison of `min(x, y)`, `max(x, y)`, `abs(x)` or `if p then x else y` with anything, as comparisons of x and y, and whether it jumps; None if it is of
+/// A comparison of `min(x, y)`, `max(x, y)`, `abs(x)` or `if p then x else y` with anything, as comparisons of x and y; None if it is of
 /// nothing like that. The smaller of two values has a kink where they are equal, and what is said of one of them, such as that it still rests at 0, is lost.
 /// Comparisons with NaN keep their results.
-pub fn apart(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<(NodeId, bool)> {
+pub fn apart(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<NodeId> {
     if let Some(parts) = of_branches(graph, id, moves) {
         return Some(parts);
     }
@@ -57,29 +57,30 @@ pub fn apart(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<(NodeId
     if has_steps(graph, &[a, b], moves) {
         return None;
     }
-    let parts = match op {
-        Binary::Eq => one_is(graph, a, b).or_else(|| one_is(graph, b, a))?,
+    match op {
+        Binary::Eq => one_is(graph, a, b).or_else(|| one_is(graph, b, a)),
         Binary::Ne => {
             let equal = one_is(graph, a, b).or_else(|| one_is(graph, b, a))?;
-            graph.unary(Unary::Not, equal)
+            Some(graph.unary(Unary::Not, equal))
         }
         Binary::Lt | Binary::Le => {
             let is_strict = op == Binary::Lt;
-            each_below(graph, a, b, is_strict).or_else(|| each_above(graph, a, b, is_strict))?
+            each_below(graph, a, b, is_strict).or_else(|| each_above(graph, a, b, is_strict))
         }
-        _ => return None,
-    };
-    Some((parts, false))
+        _ => None,
+    }
 }
 
-/// `(if p then x else y) < level` as `p & x < level | !p & y < level`; the same of other comparisons. What rests in a branch makes a jump of the choice, as a
-/// whole part is one; between two that move it is the condition that counts.
-fn of_branches(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<(NodeId, bool)> {
+/// `(if p then x else y) < level` as `p & x < level | !p & y < level`, where p, x and y move; the same of other comparisons. A branch that rests makes a jump of
+/// the choice, as a whole part is one, and it is searched as such.
+fn of_branches(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<NodeId> {
     let Node::Binary(op, a, b) = graph.node(id) else { return None };
     let is_left = matches!(graph.node(a), Node::Select(..));
     let Node::Select(condition, yes, no) = graph.node(if is_left { a } else { b }) else { return None };
     let rests = |branch| graph.variables(&[branch]).into_iter().all(|v| moves.is_steady(v));
-    let jumps = (rests(yes) || rests(no)) && has_steps(graph, &[id], moves);
+    if [condition, yes, no].into_iter().any(rests) {
+        return None;
+    }
     // The one that is not chosen may have no value.
     if !graph.reachable(&[yes, no]).into_iter().all(|id| has_value(graph.node(id))) {
         return None;
@@ -90,7 +91,7 @@ fn of_branches(graph: &mut Graph, id: NodeId, moves: &Moves<'_>) -> Option<(Node
         let compared = graph.binary(op, a, b);
         graph.binary(Binary::And, holds, compared)
     });
-    Some((graph.binary(Binary::Or, each[0], each[1]), jumps))
+    Some(graph.binary(Binary::Or, each[0], each[1]))
 }
 
 /// True for operations that have a value for all finite operands, but for overflow.

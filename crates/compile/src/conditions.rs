@@ -93,11 +93,11 @@ impl RuleBuilder<'_> {
                     }
                     // Choices of choices may be endless.
                     if taken_apart < MAX_APART
-                        && let Some((parts, jump)) = comparisons::apart(&mut self.scope.graph, id, &moves)
+                        && let Some(parts) = comparisons::apart(&mut self.scope.graph, id, &moves)
                     {
                         taken_apart += 1;
                         self.note_parts(id, parts, span);
-                        tasks.push(Task::Visit(parts, jumps || jump));
+                        tasks.push(Task::Visit(parts, jumps));
                         continue;
                     }
                     // What is left of it may jump itself.

@@ -19,7 +19,7 @@ const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// Events that are one instant in truth are nearer as integrated than this part of what is taken for the error: a fiftieth at most, in the hard
 /// cases that have such.
-const SURE: f64 = 0.03;
+const SURE: f64 = 0.1;
 
 /// The event of a module beside one which has its event now, and which is not later by more than the error.
 pub(super) struct Tie {
