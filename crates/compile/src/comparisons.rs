@@ -390,6 +390,30 @@ mod tests {
         Program::compile(graph, &[root], 2).eval_one(&variables)
     }
 
+    /// Checks that what is made of comparisons, on either side, holds for the same numbers; returns of how many something is made.
+    fn compared(
+        graph: &mut Graph,
+        (sides, levels): (&[NodeId], &[NodeId]),
+        numbers: &[f64],
+        make: impl Fn(&mut Graph, NodeId) -> Option<NodeId>,
+    ) -> usize {
+        let mut known = 0;
+        for (&side, &level) in sides.iter().flat_map(|side| levels.iter().map(move |level| (side, level))) {
+            for op in [Binary::Lt, Binary::Le, Binary::Eq, Binary::Ne] {
+                for (a, b) in [(side, level), (level, side)] {
+                    let written = graph.binary(op, a, b);
+                    let Some(made) = make(graph, written) else { continue };
+                    known += 1;
+                    for (&x, &y) in numbers.iter().flat_map(|x| numbers.iter().map(move |y| (x, y))) {
+                        let [before, after] = [written, made].map(|root| value(graph, root, [x, y]));
+                        assert_eq!(before, after, "{op:?} {side:?} {level:?}: {x}, {y}");
+                    }
+                }
+            }
+        }
+        known
+    }
+
     #[test]
     fn comparisons_taken_apart_hold_for_the_same_values() {
         let numbers =
@@ -407,27 +431,9 @@ mod tests {
         kinks.push(graph.select(is_less, double, x));
         let mut levels: Vec<NodeId> = numbers.map(|number| graph.constant(number)).into();
         levels.extend([double, kinks[1], kinks[4]]);
-        let mut known = 0;
-        for &kink in &kinks {
-            for &level in &levels {
-                for op in [Binary::Lt, Binary::Le, Binary::Eq, Binary::Ne] {
-                    for (a, b) in [(kink, level), (level, kink)] {
-                        let written = graph.binary(op, a, b);
-                        let Some(made) = apart(&mut graph, written, &Moves { steady: &[], jumping: &[] })
-                        else {
-                            continue;
-                        };
-                        known += 1;
-                        for &x in &numbers {
-                            for &y in &numbers {
-                                let [before, after] = [written, made].map(|root| value(&graph, root, [x, y]));
-                                assert_eq!(before, after, "{op:?} {kink:?} {level:?}: {x}, {y}");
-                            }
-                        }
-                    }
-                }
-            }
-        }
+        let known = compared(&mut graph, (&kinks, &levels), &numbers, |graph, written| {
+            apart(graph, written, &Moves { steady: &[], jumping: &[] })
+        });
         assert!(known > 250, "{known}");
     }
 
@@ -453,28 +459,10 @@ mod tests {
         steps.push(graph.binary(Binary::Sub, x, floor));
         let mut levels: Vec<NodeId> = numbers[..14].iter().map(|number| graph.constant(*number)).collect();
         levels.extend([x, y]);
-        let mut known = 0;
-        for step in steps {
-            for &level in &levels {
-                for op in [Binary::Lt, Binary::Le, Binary::Eq, Binary::Ne] {
-                    for (a, b) in [(step, level), (level, step)] {
-                        let written = graph.binary(op, a, b);
-                        // y rests, x moves.
-                        let Some(made) = plain(&mut graph, written, &Moves { steady: &[1], jumping: &[] })
-                        else {
-                            continue;
-                        };
-                        known += 1;
-                        for &x in &numbers {
-                            for &y in &numbers {
-                                let [before, after] = [written, made].map(|root| value(&graph, root, [x, y]));
-                                assert_eq!(before, after, "{op:?} {step:?} {level:?}: {x}, {y}");
-                            }
-                        }
-                    }
-                }
-            }
-        }
+        // y rests, x moves.
+        let known = compared(&mut graph, (&steps, &levels), &numbers, |graph, written| {
+            plain(graph, written, &Moves { steady: &[1], jumping: &[] })
+        });
         assert!(known > 250, "{known}");
     }
 }

@@ -91,7 +91,7 @@ impl RuleBuilder<'_> {
                         tasks.push(Task::Visit(plain, jumps));
                         continue;
                     }
-                    // Choices of choices may be endless.
+                    // Parts of choices of choices multiply.
                     if taken_apart < MAX_APART
                         && let Some(parts) = comparisons::apart(&mut self.scope.graph, id, &moves)
                     {
