@@ -544,11 +544,19 @@ fn empty_cells_are_not_below_zero() {
     }
 }
 
-/// The smaller of two values next to nothing is not below zero where neither is.
+/// What arrives in empty cells is on the one side of an absolute value from the first, and no condition takes it to be below zero: the smaller of two
+/// is not where neither is.
 #[test]
-fn the_smaller_of_two_empty_cells_is_not_below_zero() {
+fn what_arrives_in_empty_cells_is_not_below_zero() {
     let cells = "F_v(0, 0) ".repeat(10);
-    for guard in ["min(c, r) < 0", "max(-c, -r) > 0", "c < 0 | r < 0"] {
+    let guards = [
+        "min(c, r) < 0",
+        "max(-c, -r) > 0",
+        "c < 0 | r < 0",
+        "l > r & c < 0",
+        "(if l > r then c else r) < 0",
+    ];
+    for guard in guards {
         let text = format!(
             "initial string: F_w(0, 0) {cells} F_w(1.613, 0)\nF(l, p) < F_v(c, v) > F(r, q):\n \
              solve dc/dt = 0.643*(l + r - 2*c) + 0.672*abs(l - r) - 0.897*c, v = 0\n if {guard} produce ε"
@@ -559,6 +567,53 @@ fn the_smaller_of_two_empty_cells_is_not_below_zero() {
                 let states =
                     run(&text, settings, &[0.48]).unwrap_or_else(|e| panic!("{method:?}: {e}\n{text}"));
                 assert_eq!(states[0].len(), 12, "{method:?} {tolerance:e}: {guard}");
+            }
+        }
+    }
+}
+
+/// The first that arrives in empty cells decides over their equations (`abs(l - r)`) as more does later: it has its digits at once. Expected: the
+/// exponential of the matrix of `abs(l - r) = r - l`, with 40 digits.
+#[test]
+fn what_arrives_in_empty_cells_has_its_digits() {
+    let cells = "F_v(0) ".repeat(10);
+    let text = format!(
+        "initial string: F_w(0) {cells} F_w(1.613)
+F(l) < F_v(c) > F(r): solve dc/dt = 0.643*(l + r - 2*c) + 0.672*abs(l - r) - 0.897*c"
+    );
+    let expected = [1.0819944183120e-18, 1.5541157061535e-16, 2.0094961360495e-14, 2.3103602368080e-12];
+    for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau] {
+        for tolerance in [1e-4, 1e-6, 1e-8, 1e-10] {
+            let settings = Settings { method, tolerance, ..Settings::default() };
+            let states = run(&text, settings, &[0.053]).unwrap_or_else(|e| panic!("{method:?}: {e}"));
+            for ((_, values), expected) in states[0][1..].iter().zip(expected) {
+                let off = (values[0] / expected - 1.0).abs();
+                assert!(off < tolerance.max(1e-8), "{method:?} {tolerance:e}: {expected:e} is {off:e} off");
+            }
+        }
+    }
+}
+
+/// Two neighbours next to nothing, of which an error of integration has made the one larger that will be smaller, do not push against each other.
+#[test]
+fn what_is_next_to_nothing_has_a_side() {
+    let cells = "F_v(0) ".repeat(8);
+    let text = format!(
+        "initial string: F_w(0.349) {cells} F_v(0.407) F_w(1.508)
+F(l) < F_v(c) > F(r): solve dc/dt = 0.511*(l + r - 2*c) + 0.884*min(r, l) + 1.328*abs(r - c) - 1.339*c"
+    );
+    for method in [Method::Auto, Method::Dopri5, Method::Dop853, Method::Radau] {
+        let at = |tolerance: f64| {
+            let settings = Settings { method, tolerance, ..Settings::default() };
+            run(&text, settings, &[0.3])
+                .unwrap_or_else(|e| panic!("{method:?} {tolerance:e}: {e}"))
+                .swap_remove(0)
+        };
+        let exact = at(1e-11);
+        for tolerance in [1e-3, 1e-5, 1e-7] {
+            for (found, exact) in at(tolerance).iter().zip(&exact) {
+                let off = (found.1[0] - exact.1[0]).abs();
+                assert!(off < 10.0 * tolerance, "{method:?} {tolerance:e}: {off:e}");
             }
         }
     }

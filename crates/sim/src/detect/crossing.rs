@@ -261,7 +261,7 @@ impl CrossingDetector {
             }
         }
         if sign != Sign::Any && start != 0.0 && start * sign_of(sign) <= 0.0 {
-            let size = self.out[2 * atom].abs().max(1.0);
+            let size = self.out[2 * atom].abs().max(self.extent(path, atom).min(1.0));
             let soon = (from + 4.0 * path.start.resolution() / path.h).min(limit);
             let then = self.difference(path, atom).value(soon);
             if sign == Sign::Zero && then == 0.0 || then * sign_of(sign) > tolerance {
@@ -312,6 +312,14 @@ impl CrossingDetector {
         let passes = at == Sign::Zero && after != sign;
         let level = if passes { self.level_of(path, atom) } else { None };
         Some(Crossing { position, time, at, after, level })
+    }
+
+    /// The size of the largest variable that an atom reads, anywhere on a path: what arrives in empty cells is far smaller than 1, and no rounding of it.
+    fn extent(&mut self, path: &Path, atom: usize) -> f64 {
+        path.over(0.0, 1.0, &mut self.bounds);
+        let sizes =
+            path.rule.atom_reads[atom].iter().map(|variable| self.bounds[*variable].value.magnitude());
+        sizes.fold(0.0, f64::max)
     }
 
     /// The place at which a difference that leaves zero at the beginning of a stretch has left it: an output that is a polynomial through

@@ -75,17 +75,26 @@ impl EventStage<'_, '_> {
                 let noise = if entry.guess[atom] == Sign::Zero { least_way.max(unrest) } else { least_way };
                 if way > least * size && way > noise { Sign::of(slope) } else { Sign::Zero }
             };
-            // What was at zero, and is beyond it by more than its noise without having been seen to leave, has not come back yet.
-            let has_left = |towards: Sign| {
+            // Beyond zero on a side by more than its noise.
+            let is_on = |side: Sign| {
                 let gap = a.value - b.value;
                 let values: SmallVec<[f64; 16]> = moving.iter().map(|x| x.value).collect();
-                Sign::of(gap) == opposite(towards)
+                Sign::of(gap) == side
                     && !rule.jumping_whole[atom]
                     && gap.abs() > CLEAR * noise(rule, atom, &values, error.max(NEAR))
             };
             after[atom] = match (clear(slope, 1e-9), entry.guess[atom]) {
-                (towards @ (Sign::Plus | Sign::Minus), Sign::Zero) if error > 0.0 && has_left(towards) => {
+                // What was at zero, and is beyond it without having been seen to leave, has not come back yet.
+                (towards @ (Sign::Plus | Sign::Minus), Sign::Zero)
+                    if error > 0.0 && is_on(opposite(towards)) =>
+                {
                     Sign::Zero
+                }
+                // What has been seen to leave has done so, wherever noise seems to take it.
+                (towards, guess @ (Sign::Plus | Sign::Minus))
+                    if towards != guess && error > 0.0 && is_on(guess) =>
+                {
+                    guess
                 }
                 (Sign::Zero, guess @ (Sign::Plus | Sign::Minus))
                     if !elsewhere && self.goes_on_alike(id, FAR_AWAY) =>
