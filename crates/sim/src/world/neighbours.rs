@@ -215,17 +215,21 @@ impl Neighbours {
 
     /// Remembers that a module looked at another.
     pub fn note(&mut self, tree: &Tree, looker: ModuleId, seen: ModuleId) {
-        if self.lookers(seen).last() == Some(&looker) {
+        let around = self.slot(seen);
+        let count = usize::from(around.count);
+        if (1..=FEW).contains(&count) && around.lookers[count - 1] == looker {
             return;
         }
-        let around = self.slot(seen);
-        if usize::from(around.count) < FEW {
-            around.lookers[usize::from(around.count)] = looker;
+        if count < FEW {
+            around.lookers[count] = looker;
             around.count += 1;
             return;
         }
         if around.count == CROWD {
             let crowd = self.crowds.get_mut(&seen.slot()).expect("it has many");
+            if crowd.last() == Some(&looker) {
+                return;
+            }
             if crowd.len() == crowd.capacity() {
                 let kept = tidy(tree, looker, crowd);
                 crowd.truncate(kept);

@@ -128,6 +128,16 @@ impl Few {
         Ok(())
     }
 
+    /// Lets so many parameters rest, and no more.
+    #[inline]
+    fn rest(&mut self, count: usize) {
+        if !matches!(self.formula, Trajectory::Rest) {
+            self.formula = Trajectory::Rest;
+        }
+        self.how = [NOTHING; FEW];
+        self.how[..count].fill(RESTS);
+    }
+
     /// Makes some parameters components of the coupled modules; false if others stand in the way.
     #[inline]
     fn couple(&mut self, parameters: &[usize], first: u32) -> bool {
@@ -245,7 +255,10 @@ impl Trajectories {
 
     /// Makes some of so many parameters components of the module's own step, in this order, and lets the others rest.
     pub fn follow_step(&mut self, count: usize, numeric: impl Iterator<Item = usize>) {
-        self.assign((0..count).map(|_| Trajectory::Rest));
+        match &mut self.0 {
+            Kept::Few(few) if count <= FEW => few.rest(count),
+            _ => self.assign((0..count).map(|_| Trajectory::Rest)),
+        }
         for (parameter, component) in numeric.zip(0..) {
             self.set(parameter, Trajectory::Step(component));
         }
@@ -254,10 +267,7 @@ impl Trajectories {
     /// Lets all parameters rest.
     pub fn rest(&mut self) {
         match &mut self.0 {
-            Kept::Few(few) => {
-                few.formula = Trajectory::Rest;
-                few.how.iter_mut().filter(|how| **how != NOTHING).for_each(|how| *how = RESTS);
-            }
+            Kept::Few(few) => few.rest(few.how.iter().take_while(|how| **how != NOTHING).count()),
             Kept::Many(all) => all.fill_with(Trajectory::default),
             Kept::Own(own) => own.all.rest(),
         }
