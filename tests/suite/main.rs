@@ -22,6 +22,7 @@ mod export;
 mod falling;
 mod files;
 mod films;
+mod fronts;
 mod gallery;
 mod gas;
 mod glb;
